@@ -148,7 +148,7 @@ def test_adaptation_has_compensator_and_monitor_adapt(launch: Launch) -> None:
 
 
 def test_another_scanner_is_refused_with_what_to_give(launch: Launch) -> None:
-    with pytest.raises(InputError, match=r"scanner stage: give sim, .*module:Class, and :FILE"):
+    with pytest.raises(InputError, match=r"scanner 'stage': give sim, .*module:Class, and :FILE"):
         launch(scanner="stage", model="own.yaml")
 
 

@@ -1,9 +1,7 @@
 """Checks what a user gives, and converts arrays to and from the core's signals of two axes."""
 
-import math
-import os
 from collections.abc import Iterable, Sequence
-from pathlib import Path
+from numbers import Integral, Real
 from typing import TypeVar
 
 import numpy as np
@@ -31,16 +29,9 @@ def of_type(kind: type[Kind], name: str, given: object, fix: str) -> Kind:
 
 def all_of_type(kind: type[Kind], name: str, given: Iterable[Kind], fix: str) -> tuple[Kind, ...]:
     """Return all that an argument holds; raises InputError where anything is of another type."""
-    if not isinstance(given, Iterable):
+    if not isinstance(given, Iterable) or isinstance(given, str):
         raise InputError(f"{name} is of type {type(given).__name__}: give {fix}")
     return tuple(of_type(kind, f"{name}[{k}]", each, fix) for k, each in enumerate(given))
-
-
-def path_of(name: str, given: object) -> Path:
-    """Return a path; raises InputError for anything else."""
-    if not isinstance(given, str | os.PathLike):
-        raise InputError(f"{name} is of type {type(given).__name__}: give a path, as 'model.yaml'")
-    return Path(given)
 
 
 def samples(what: str, given: ArrayLike) -> Array:
@@ -68,15 +59,24 @@ def samples(what: str, given: ArrayLike) -> Array:
     return values
 
 
+def positive(name: str, given: object, fix: str) -> float:
+    """Return a number; raises InputError, with the ``fix``, unless it is finite and positive."""
+    number = np.asarray(given if isinstance(given, Real | np.ndarray) else np.nan)
+    if number.ndim or number.dtype.kind not in "fiu" or not 0.0 < number < np.inf:
+        raise InputError(f"{name} is {given!r}: give a positive number, {fix}")
+    return float(number)
+
+
+def whole(name: str, given: object, least: int) -> int:
+    """Return a whole number; raises InputError for any other, and for one below the least."""
+    if isinstance(given, bool) or not isinstance(given, Integral) or given < least:
+        raise InputError(f"{name} is {given!r}: give a whole number, {least} or more")
+    return int(given)
+
+
 def period_of(given: float) -> float:
     """Return a sample period in s; raises InputError unless it is finite and positive."""
-    try:
-        period = float(given)
-    except (TypeError, ValueError):
-        raise InputError(f"sample_period is {given!r}: give seconds, as 1e-5") from None
-    if not 0.0 < period < math.inf:
-        raise InputError(f"sample_period is {period:g} s: give a positive number of seconds")
-    return period
+    return positive("sample_period", given, "in s, as 1e-5")
 
 
 def axes_of(given: Sequence[str]) -> tuple[str, ...]:
@@ -90,26 +90,18 @@ def axes_of(given: Sequence[str]) -> tuple[str, ...]:
     return axes
 
 
-def refuse_unknown_axes(axes: Sequence[str]) -> None:
-    """Raise InputError where an axis is neither x nor y."""
-    for name in axes:
-        if name not in AXES:
-            raise InputError(f"axes names {name!r}, which is unknown: choose among {_list(AXES)}")
-
-
 def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
     """Raise InputError unless values (n, channels) have one channel for each axis."""
     channels = values.shape[1]
     if channels != len(axes):
         raise InputError(
             f"{what} has {channels} channel{'s' * (channels > 1)}, but the axes are"
-            f" {_list(axes)}: give shape (n, {len(axes)})"
+            f" {', '.join(axes)}: give shape (n, {len(axes)})"
         )
 
 
 def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
     """Return values (n, channels) as both axes of a run from sample 0; an absent one is zero."""
-    refuse_unknown_axes(axes)
     given = {name: values[:, channel] for channel, name in enumerate(axes)}
     still = np.zeros(len(values))
     return Trace(0, sample_period, *(given.get(name, still) for name in AXES))
@@ -118,7 +110,3 @@ def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
 def channels_of(trace: Trace, axes: Sequence[str]) -> Array:
     """Return some axes of a run as (n, channels), each channel contiguous."""
     return np.stack([trace.axis(name) for name in axes]).T
-
-
-def _list(names: Sequence[str]) -> str:
-    return ", ".join(names)

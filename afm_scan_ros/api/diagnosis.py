@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type
+from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type, positive
 from afm_scan_ros.api.identification import coupled_records
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
@@ -24,6 +24,7 @@ from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_r
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.report import diagnosis_page
 from afm_scan_ros.report.diagnosis_text import (
     caution_text,
@@ -160,8 +161,10 @@ class Diagnosis:
     def save(self, folder: Path | str) -> None:
         """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder.
 
-        Of coupled axes there are no figures.
+        Of coupled axes there are no figures. Folders that are missing are made. Raises InputError
+        where a file cannot be written.
         """
+        into = path_of(folder, "diagnosis")
         sources = [
             source_of(record.name, info_of(record), len(record.drive), record.shortcomings)
             for record in self.records
@@ -169,11 +172,11 @@ class Diagnosis:
         base = self._base.coupled if self._base.is_coupled else self._base.scanner
         of = provenance_of(self._base.origin, base, sources, datetime.now(UTC))
         if isinstance(self._found, CoupledDiagnosis):
-            diagnosis_page.write_coupled(Path(folder), self._found, HEADING, of)
+            diagnosis_page.write_coupled(into, self._found, HEADING, of)
             return
         from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
 
-        write_diagnosis(Path(folder), self.residual_report, HEADING, of)
+        write_diagnosis(into, self.residual_report, HEADING, of)
 
 
 def diagnose(
@@ -182,6 +185,8 @@ def diagnose(
     healthy: Iterable[Record] = (),
     progress: ProgressCallback | None = None,
     longest: float = LONGEST,
+    *,
+    parallel: bool = True,
 ) -> Diagnosis:
     """Find the effects that explain the residual of a model in records.
 
@@ -199,6 +204,8 @@ def diagnose(
             They add the model's error on motion of their kind to the model.
         progress: is called with the effect that is being tried.
         longest: length of a proposed experiment, at most, s.
+        parallel: diagnose the axes at the same time, in threads. In turn, they take less time of
+            the cores, and longer. Coupled axes are diagnosed together.
 
     Raises InputError where an argument is of another type, there is no record, a record is of
     another scanner or unit or is given twice, its drive leaves the range that the model was
@@ -219,6 +226,7 @@ def diagnose(
     """
     of_type(Model, "model", model, MODEL)
     given = tuple(_named(all_of_type(Record, "records", records, RECORDS), "record"))
+    longest = positive("longest", longest, "in s, as 60.0")
     well = tuple(_named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
     if model.is_coupled:
         return _coupled(model, given, well, progress or (lambda _: None))
@@ -229,7 +237,9 @@ def diagnose(
     refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
     progress = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(scanner, observations, progress, of_healthy, longest)
+        found = diagnose_scanner(
+            scanner, observations, progress, of_healthy, longest, parallel=parallel
+        )
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")

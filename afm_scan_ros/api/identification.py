@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from afm_scan_ros.api.arguments import RECORDS, all_of_type
+from afm_scan_ros.api.arguments import RECORDS, all_of_type, whole
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.errors import InputError
@@ -97,8 +97,8 @@ def identify(
     The records of any other axis are fitted together. ``Model.effects`` states what they identify;
     all else is unknown, and is left out of predictions and inverses.
 
-    Raises InputError where a record cannot show what it is for, ScanError where a fit does not
-    converge.
+    Raises InputError where a record cannot show what it is for, and for arguments out of range;
+    ScanError where a fit does not converge.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -111,17 +111,29 @@ def identify(
     {'creep': 'identified', 'hysteresis': 'unknown', 'vibration': 'unknown'}
     """
     given = list(all_of_type(Record, "records", records, RECORDS))
+    effects = all_of_type(str, "effects", effects, "names of effects, as ['maxwell_slip']")
+    states = None if states is None else whole("states", states, 2)
+    sizes = Sizes(whole("levels", levels, 3), _order_of(order), delay)
     report = progress or (lambda _: None)
     if not given:
         raise InputError("no record is given: give one at least")
     several = any(len(record.axes) > len(AXES) for record in given)
-    if several or effects or states or of_coupled_axes(given):
+    if several or effects or states is not None or of_coupled_axes(given):
         return identify_coupled_axes(given, effects, states, report)
     checked = [_given(record, number) for number, record in enumerate(given, start=1)]
-    sizes = Sizes(levels, None if order is None else Order(*order), delay)
     found = identify_records(checked, sizes, report)
     names = ", ".join(each.recording.name for each in checked)
     return Model(found.model, f"identified from {names}", found)
+
+
+def _order_of(given: tuple[int, int] | None) -> Order | None:
+    if given is None:
+        return None
+    try:
+        poles, zeros = given
+    except (TypeError, ValueError):
+        raise InputError(f"order is {given!r}: give poles and zeros, as (4, 3)") from None
+    return Order(whole("order, poles", poles, 1), whole("order, zeros", zeros, 0))
 
 
 def _given(record: Record, number: int) -> GivenRecord:

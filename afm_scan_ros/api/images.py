@@ -1,14 +1,13 @@
 """A scanner without a displacement sensor: a model from images of a grating, images corrected."""
 
 from collections.abc import Iterable, Sequence
-from numbers import Real
 from pathlib import Path
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type
+from afm_scan_ros.api.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type, positive
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -92,8 +91,8 @@ def identify_from_images(
     given = all_of_type(ScanImage, "images", images, IMAGES)
     if not given:
         raise InputError("no image is given: give one at least")
-    if not (isinstance(pitch, Real) and np.isfinite(pitch) and pitch > 0.0):
-        raise InputError(f"pitch is {pitch!r}: give the grating's pitch in m")
+    pitch = positive("pitch", pitch, "in m, as 10e-6")
+    accuracy = positive("accuracy", accuracy, "as 0.0035 for 0.35 % of a pitch")
     scales = _scales(volts_per_metre)
     for image in given:
         _both_directions(image)

@@ -8,7 +8,7 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples
+from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples, whole
 from afm_scan_ros.api.model import UNLIMITED, Model
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.errors import InputError
@@ -22,6 +22,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace
 from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.paths import path_of
 
 LOG = logging.getLogger(__name__)
 
@@ -58,7 +59,7 @@ class Learned:
     def save(self, path: Path | str) -> None:
         """Write the correction for ``afm-scan scan --learned``."""
         correction = best_of(list(self.scans)).correction
-        save_learned(Path(path), correction, self.model.scanner)
+        save_learned(path_of(path, "learned.npz"), correction, self.model.scanner)
 
 
 def learn(
@@ -99,6 +100,7 @@ def learn(
     of_type(Model, "model", model, MODEL)
     of_type(ScanSpec, "spec", spec, SPEC)
     of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
+    scans = whole("scans", scans, 1)
     session = _Measured(measure, limits or UNLIMITED, progress or _silent)
     found = list(learning_scans(session, model.scanner, spec, scans, session.limits))
     if not best_of(found).steps:

@@ -15,7 +15,6 @@ from afm_scan_ros.api.arguments import (
     all_of_type,
     channels_of,
     of_type,
-    path_of,
     period_of,
     refuse_other_count,
     samples,
@@ -33,6 +32,7 @@ from afm_scan_ros.core.trajectory import desired as desired_of
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files import model_file, share_directory, version, yaml
+from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.report.effect_status_text import left_out
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
+MODEL_FILE = "model.yaml"
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 
 
@@ -174,8 +175,6 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         target = self._trace("desired", desired, sample_period)
-        if isinstance(effects, str):
-            raise InputError(f"effects is {effects!r}: give a list, as [{effects!r}]")
         names = "a list of effects, as ['creep']"
         chosen = INVERSES if effects is None else all_of_type(str, "effects", effects, names)
         settings = InverseSettings()
@@ -190,15 +189,17 @@ class Model:
     def save(self, path: Path | str, heading: str | None = None) -> None:
         """Write the model file ``path`` and its arrays beside it, in place of what is there.
 
-        ``heading`` is the comment at the file's head.
+        ``heading`` is the comment at the file's head. Folders that are missing are made. Raises
+        InputError where the files cannot be written.
         """
+        file = path_of(path, MODEL_FILE)
         made = heading or f"A scanner's model, written by afm_scan_ros {version()}."
         if isinstance(self._scanner, ScannerModel):
-            model_file.save_model(Path(path), self._scanner, made)
+            model_file.save_model(file, self._scanner, made)
         else:
             from afm_scan_ros.files import coupled_file  # noqa: PLC0415 - see predict
 
-            coupled_file.save_coupled(Path(path), self._scanner, made)
+            coupled_file.save_coupled(file, self._scanner, made)
 
     def _refuse_periodic(self, *, periodic: bool) -> None:
         if periodic:
@@ -228,7 +229,7 @@ def load_model(path: Path | str | None = None) -> Model:
     >>> afm.load_model().axes
     ('x', 'y')
     """
-    file = share_directory() / "config/model.yaml" if path is None else path_of("path", path)
+    file = share_directory() / "config/model.yaml" if path is None else path_of(path, MODEL_FILE)
     content = yaml.load(file)
     if isinstance(content, Mapping) and "coupled" in content:
         from afm_scan_ros.files.coupled_file import load_coupled  # noqa: PLC0415 - see predict

@@ -1,9 +1,7 @@
 """A record: drive and measured displacement of a scanner, from arrays, bags or tables."""
 
 import logging
-import math
 from collections.abc import Mapping
-from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -17,11 +15,12 @@ from afm_scan_ros.api.arguments import (
     axes_of,
     channels_of,
     of_type,
-    path_of,
     period_of,
+    positive,
     refuse_other_count,
     samples,
     trace_of,
+    whole,
 )
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.core.errors import InputError
@@ -30,6 +29,7 @@ from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.files.columns import USE, parse_columns, read_table_record
+from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.files.text_table import RowRange
 
 if TYPE_CHECKING:
@@ -119,6 +119,11 @@ class Record:
 
         Logs the shortcomings. Raises InputError for other axes than x and y.
         """
+        if not set(self.axes) <= set(AXES):
+            raise InputError(
+                f"{self.name or 'record'}: its axes are {', '.join(self.axes)}: name them x and y,"
+                " unless the scanner has coupled axes"
+            )
         refuse_other_count("drive", self.drive, self.axes)
         for shortcoming in self.shortcomings:
             LOG.warning("%s", shortcoming)
@@ -172,7 +177,7 @@ def read_record(
     >>> record.sample_period, float(record.displacement[100, 0])
     (0.001, 1e-06)
     """
-    path = path_of("path", path)
+    path = path_of(path, "scan.mcap")
     if not path.exists():
         raise InputError(
             f"{path} does not exist: give a table (text, .npy, .npz or .mat), a rosbag2 folder or"
@@ -180,10 +185,9 @@ def read_record(
         )
     if columns is None and not is_table(path):
         return _from_bag(read_scan(path, topics), kind, start)
-    if sample_rate is not None and not (
-        isinstance(sample_rate, Real) and 0.0 < float(sample_rate) < math.inf
-    ):
-        raise InputError(f"sample_rate is {sample_rate!r}: give a positive number, in Hz")
+    skip_rows = whole("skip_rows", skip_rows, 0)
+    if sample_rate is not None:
+        sample_rate = positive("sample_rate", sample_rate, "in Hz, as 1e5")
     chosen = None if columns is None else parse_columns(of_type(str, "columns", columns, USE))
     found = read_table_record([path], chosen, RowRange(skip_rows), sample_rate)
     for quantity in ("drive", "achieved"):

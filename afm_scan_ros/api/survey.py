@@ -67,7 +67,8 @@ def survey_bag(assigned: Assignment) -> Recording:
     begun = evolve(assigned.failed(""), error="")
     try:
         record = read_record(assigned.bag)
-        found = diagnose(_model(assigned.model_file, assigned.model), [record])
+        model = _model(assigned.model_file, assigned.model)
+        found = diagnose(model, [record], parallel=False)  # other bags keep the other cores busy
         return _with_diagnosis(_with_record(begun, record), found)
     except (InputError, ScanError) as error:
         return assigned.failed(error)

@@ -8,7 +8,7 @@ import numpy as np
 
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.scan_channels import STREAMS, scan_channels
-from afm_scan_ros.cli.options import FILE, RECORD, refuse_existing, topic_option, warn, working
+from afm_scan_ros.cli.options import NEW_FILE, RECORD, refuse_existing, topic_option, warn, working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array
@@ -41,7 +41,7 @@ SIGNALS = {
 @click.option(
     "--to",
     "target",
-    type=FILE,
+    type=NEW_FILE,
     required=True,
     help="File to write. The suffix gives the format: .gwy, .gsf, .nc or .csv.",
 )
@@ -79,7 +79,6 @@ def _written(
     suffix = target.suffix.lower()
     if suffix == TEXT:
         signals = _signals(recording, [name for name in SIGNALS if name != "true_displacement"])
-        target.parent.mkdir(parents=True, exist_ok=True)
         write_signals(target, signals)
         return (target,), (), signals
     signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()

@@ -7,7 +7,7 @@ import click
 from attrs import evolve
 
 from afm_scan_ros.api.images import ACCURACY, correct_image, identify_from_images
-from afm_scan_ros.cli.options import FILE, FOLDER, positive, refuse_existing, working
+from afm_scan_ros.cli.options import FILE, FOLDER, NEW_FILE, positive, refuse_existing, working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import image_channels, words_of
@@ -26,7 +26,7 @@ SUFFIX = ".gwy"
 @click.option(
     "--pitch", type=positive("m"), required=True, help="Distance of neighbouring cells, as 10um."
 )
-@click.option("--out", type=FILE, required=True, help="Model file to write.")
+@click.option("--out", type=NEW_FILE, required=True, help="Model file to write.")
 @click.option(
     "--correct",
     type=FILE,
@@ -89,7 +89,6 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     volts_per_metre = PER_MICROMETRE * (scale or 1.0)
     with working("grating", at_once=False) as report:
         found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
-    out.parent.mkdir(parents=True, exist_ok=True)
     found.model.save(out)
     used = found.images
     table = grating_table(used, found.positions, found.figures, found.drift, found.refused)

@@ -11,7 +11,7 @@ from afm_scan_ros.api import identification as api
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.cli.options import (
-    FILE,
+    NEW_FILE,
     RECORD,
     TableOptions,
     record_options,
@@ -26,6 +26,7 @@ from afm_scan_ros.core.identification.identify import AxisIdentification, Identi
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
@@ -78,7 +79,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 @click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
-    type=FILE,
+    type=NEW_FILE,
     default="model.yaml",
     show_default=True,
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
@@ -117,12 +118,11 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
         _write_coupled(model, out)
         return
     found = model.fit
-    out.parent.mkdir(parents=True, exist_ok=True)
-    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
-    out.with_suffix(".fit.json").write_text(summary + "\n", "utf-8")
-    out.with_suffix(".fit.html").write_text(fit_page(found), "utf-8")
-    _show(found)
     model.save(out, HEADING)
+    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
+    write_text(out.with_suffix(".fit.json"), summary + "\n")
+    write_text(out.with_suffix(".fit.html"), fit_page(found))
+    _show(found)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     click.echo(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
 
@@ -136,7 +136,6 @@ def _write_coupled(model: Model, out: Path) -> None:
             f"   driven by {error.drive_rms:.3g} V rms, held-out record:"
             f" {1e9 * error.error_rms:.1f} nm rms, {error.relative:.2%} of the displacement's"
         )
-    out.parent.mkdir(parents=True, exist_ok=True)
     model.save(out, HEADING)
     click.echo(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
 

@@ -11,10 +11,11 @@ from afm_scan_ros.api.model import load_model
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import (
+    BAG,
     FILE,
-    RECORD,
+    NEW_FILE,
     TableOptions,
-    quantity,
+    positive,
     refuse_existing,
     table_options,
     warn,
@@ -26,6 +27,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import USE_OF_PATH, TableRecord, read_table_record
+from afm_scan_ros.files.paths import writing
 from afm_scan_ros.files.text_table import RowRange
 
 STREAM = {
@@ -39,7 +41,7 @@ STREAM = {
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=FILE)
 @table_options
-@click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
+@click.option("--bag", required=True, type=BAG, help="Folder to create for the bag.")
 @click.option(
     "--start-row", type=click.IntRange(1), default=1, help="First row to import, counted from 1."
 )
@@ -135,9 +137,9 @@ def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]
     help="Table of the path, from rest at zero: text, .npy, .npz or .mat with headings as 'time"
     " [s]' and 'desired_x [um]'.",
 )
-@click.option("--out", type=FILE, required=True, help="CSV file of the drive to write.")
+@click.option("--out", type=NEW_FILE, required=True, help="CSV file of the drive to write.")
 @table_options
-@click.option("--limit", type=quantity("V"), help="Voltage that the drive must not exceed.")
+@click.option("--limit", type=positive("V"), help="Voltage that the drive must not exceed.")
 def invert(
     model: Path,
     desired: Path,
@@ -169,5 +171,5 @@ def invert(
 def _write(out: Path, axes: tuple[str, ...], period: float, drive: np.ndarray) -> None:
     heading = ",".join(["time_s", *(f"drive_{axis}_v" for axis in axes)])
     table = np.column_stack([period * np.arange(len(drive)), drive])
-    out.parent.mkdir(parents=True, exist_ok=True)
-    np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")
+    with writing(out):
+        np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")

@@ -120,7 +120,6 @@ class NodeSession:
 
     def _model_file(self, model: ScannerModel) -> Path:
         path = self.out / "models" / f"{model_hash(model)[:12]}.yaml"
-        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists():
             save_model(path, model, "A model that scans were made with.")
         return path

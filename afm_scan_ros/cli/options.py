@@ -2,6 +2,7 @@
 
 import logging
 import math
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,14 +23,42 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns
+from afm_scan_ros.files.paths import refuse_unwritable
 from afm_scan_ros.files.units import A_NUMBER, METRES, SECONDS, VOLTS, in_ascii
 
 CONFIG = share_directory() / "config"
 
-FILE = click.Path(dir_okay=False, path_type=Path)
-FOLDER = click.Path(file_okay=False, path_type=Path)
-RECORD = click.Path(path_type=Path)
+
+class _Path(click.Path):
+    """A path that is not empty; a ``new`` one must be where files can be written."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True, new: bool = False) -> None:
+        super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+        self.new = new
+
+    def convert(
+        self,
+        value: str | os.PathLike[str],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401 - as click.Path does
+        """Return the path; refuses it before anything is computed."""
+        if not os.fspath(value):
+            self.fail("the path is empty: give one", param, ctx)
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if self.new:
+            refuse_unwritable(path)
+        return path
+
+
+FILE = _Path(dir_okay=False)
+NEW_FILE = _Path(dir_okay=False, new=True)
+FOLDER = _Path(file_okay=False, new=True)
+"""Folder to write files to."""
+RECORD = _Path()
 """A rosbag2 folder, an .mcap file, or a table of numbers."""
+BAG = _Path(new=True)
+"""Folder to create for a bag."""
 
 
 def refuse_existing(*paths: Path, other: str = "folder") -> None:

@@ -13,6 +13,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import (
     FILE,
     FOLDER,
+    NEW_FILE,
     RECORD,
     TableOptions,
     positive,
@@ -30,6 +31,7 @@ from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import model_file
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
@@ -37,23 +39,13 @@ from afm_scan_ros.report.scan_report import adaptation_rows, error_tables, scan_
 from afm_scan_ros.report.table import Rows, show
 
 
-def _in_folder(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
-    """Refuse a file whose folder is missing, before anything is computed."""
-    if value is not None and not value.parent.is_dir():
-        raise click.BadParameter(f"there is no folder {value.parent}: make it first", ctx, param)
-    return value
-
-
 @click.command()
 @click.argument("bag", type=RECORD)
-@click.option(
-    "--json", "json_file", type=FILE, callback=_in_folder, help="Write all numbers as JSON."
-)
-@click.option("--report", type=FILE, callback=_in_folder, help="Write a report as one HTML file.")
+@click.option("--json", "json_file", type=NEW_FILE, help="Write all numbers as JSON.")
+@click.option("--report", type=NEW_FILE, help="Write a report as one HTML file.")
 @click.option(
     "--figure",
-    type=FILE,
-    callback=_in_folder,
+    type=NEW_FILE,
     help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
 @topic_option
@@ -75,9 +67,9 @@ def analyze(
     warn(recording.warnings)
     show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
     if json_file is not None:
-        json_file.write_text(json.dumps(plain(analysis), indent=2) + "\n", "utf-8")
+        write_text(json_file, json.dumps(plain(analysis), indent=2) + "\n")
     if report is not None:
-        report.write_text(scan_report(analysis, view_of(recording)), "utf-8")
+        write_text(report, scan_report(analysis, view_of(recording)))
     if figure is not None:
         save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
     if analysis.shortcomings:
@@ -96,7 +88,7 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
                 f" {nanometres(error.peak_to_peak)} nm"
             )
     if json_file is not None:
-        json_file.write_text(json.dumps(plain(found), indent=2) + "\n", "utf-8")
+        write_text(json_file, json.dumps(plain(found), indent=2) + "\n")
 
 
 HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {bag}."
@@ -105,7 +97,7 @@ HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {ba
 @click.command()
 @click.argument("bag", type=RECORD)
 @click.option("--model", required=True, type=FILE, help="Model file of the scanner.")
-@click.option("--out", required=True, type=FILE, help="Model file to write, with the changes.")
+@click.option("--out", required=True, type=NEW_FILE, help="Model file to write, with the changes.")
 @click.option(
     "--time-constant",
     type=positive("s"),
@@ -159,7 +151,7 @@ def adapt(
 @click.option(
     "--healthy",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=RECORD,
     metavar="RECORD",
     help="Record of the scanner while it was healthy, as an ordinary scan. It adds the model's"
     " error on such motion. May be given several times.",

@@ -9,7 +9,7 @@ from typing import TypedDict, Unpack
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.options import CONFIG, FILE, RECORD, refuse_existing
+from afm_scan_ros.cli.options import BAG, CONFIG, FILE, refuse_existing
 from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
 from afm_scan_ros.cli.scanner import (
     FILES,
@@ -256,7 +256,7 @@ def _commands(
     is_flag=True,
     help="Track changes of gain, resonance and slow creep, and scan accordingly.",
 )
-@click.option("--bag", required=True, type=RECORD, help="Folder to create for the bag.")
+@click.option("--bag", required=True, type=BAG, help="Folder to create for the bag.")
 def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
     model: Path,

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers import OURS, load_settings, settings_file
+from afm_scan_ros.drivers import DEFAULTS, OURS, load_settings, settings_file
 from afm_scan_ros.drivers.files import FileExchange
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.plant_file import load_plant
@@ -203,21 +203,36 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
         if plant is not None and scanner != SIM:
             raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
-        _refuse_default_model(scanner)
+        _refuse_incomplete(scanner)
         command(scanner=scanner, plant=plant or PLANT, **options)
 
     return with_scanner
 
 
-def _refuse_default_model(scanner: str) -> None:
-    """Raise InputError where a real scanner would be driven by the model of the simulated one."""
+def _refuse_incomplete(scanner: str) -> None:
+    """Raise InputError where a scanner lacks its settings, or its own model."""
+    lacking = [*_settings_lacking(scanner), *_model_lacking(scanner)]
+    if lacking:
+        raise InputError(f"--scanner {scanner}: {'; '.join(lacking)}")
+
+
+def _settings_lacking(scanner: str) -> Iterator[str]:
+    if scanner in (SIM, EXTERNAL):
+        return
+    driver, file = _driver_and_text(scanner)
+    if not file and driver not in DEFAULTS:
+        yield f"give its settings, as --scanner {driver}:stage.yaml"
+
+
+def _model_lacking(scanner: str) -> Iterator[str]:
+    """Say so where a real scanner would be driven by the model of the simulated one."""
     context = click.get_current_context()
     model = context.params.get("model")
     default = context.get_parameter_source("model") is ParameterSource.DEFAULT
     if model is not None and default and scanner.partition(":")[0] not in SIMULATED:
-        raise InputError(
-            f"--scanner {scanner}: give this scanner's model by --model FILE: another scanner's may"
-            f" drive its resonance. To use the simulated scanner's on purpose, give --model {model}"
+        yield (
+            "give this scanner's model by --model FILE: another scanner's may drive its resonance."
+            f" To use the simulated scanner's on purpose, give --model {model}"
         )
 
 
@@ -233,23 +248,29 @@ def _longest_wait() -> float:
 
 def driver_and_file(scanner: str) -> tuple[str, Path]:
     """Return the parts of DRIVER[:FILE], with the default of FILE; refuses any other text."""
+    driver, file = _driver_and_text(scanner)
+    if driver == FILES:
+        raise InputError(
+            f"--scanner {scanner}: no node exchanges files: give it to a command of afm-scan"
+        )
+    with naming(f"--scanner {scanner}"):
+        return driver, settings_file(driver, file)
+
+
+def _driver_and_text(scanner: str) -> tuple[str, str]:
+    """Return the parts of DRIVER[:FILE]; raises InputError for a text of another form."""
     first, _, rest = scanner.partition(":")
-    if first in OURS:
+    if first in (*OURS, FILES):
         driver, file = first, rest
     else:
         kind, _, file = rest.partition(":")
         driver = f"{first}:{kind}"
     if driver.endswith(":"):
         raise InputError(
-            f"--scanner {scanner}: give {SIM}, {EXTERNAL}, {FILES}:FILE, {', '.join(OURS)} or"
+            f"--scanner {scanner!r}: give {SIM}, {EXTERNAL}, {FILES}:FILE, {', '.join(OURS)} or"
             " module:Class, and :FILE for the scanner's settings"
         )
-    if first == FILES:
-        raise InputError(
-            f"--scanner {scanner}: no node exchanges files: give it to a command of afm-scan"
-        )
-    with naming(f"--scanner {scanner}"):
-        return driver, settings_file(driver, file)
+    return driver, file
 
 
 def _external() -> ScannerChoice:

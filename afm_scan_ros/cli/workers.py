@@ -170,8 +170,9 @@ def on_cluster(
             raise InputError(
                 f"--scheduler {address}: it has no workers: start some with 'dask worker {address}'"
             ) from error
-        submit = partial(client.submit, _keeping_memory, work, pure=False)
-        running = {submit(task): task for task in tasks}
+        futures = client.map(partial(_keeping_memory, work), tasks, pure=False)
+        running = dict(zip(futures, tasks, strict=True))
+        del futures  # the workers keep a result as long as there is a future of it
         for future in as_completed(running):
             failure = future.exception()  # waits where a result was lost, for it is computed anew
             if future.cancelled():

@@ -15,7 +15,9 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 def _above_zero(_: object, attribute: "Attribute[float]", value: object) -> None:
-    if not (isinstance(value, Real) and float(value) > 0.0):  # NaN is not
+    if isinstance(value, bool) or not (
+        isinstance(value, Real) and float(value) > 0.0
+    ):  # NaN is not
         raise InputError(f"{attribute.name} = {value!r}: give a number above 0")
 
 

@@ -16,7 +16,8 @@ from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.model_file import AddedEffect, listed, values_of
+from afm_scan_ros.files.model_file import AddedEffect, listed, save_arrays, values_of
+from afm_scan_ros.files.paths import writing
 from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 MATRICES = ("a", "b", "c", "d")
@@ -54,8 +55,6 @@ def save_coupled(path: Path, scanner: CoupledScanner, heading: str) -> None:
     matrices = {name: getattr(linear, name) for name in MATRICES}
     matrices["drive_scale"] = actuators.drive_scale[np.newaxis]
     matrices["elongation"] = actuators.elongation
-    beside = path.with_suffix(".npz")
-    np.savez(beside, **matrices)
     content = _Coupled(
         scanner.axes,
         scanner.sample_period,
@@ -68,8 +67,9 @@ def save_coupled(path: Path, scanner: CoupledScanner, heading: str) -> None:
             for effect in scanner.effects
         ),
     )
-    file = _CoupledFile(content, beside.name, Archive(beside).sha256())
-    yaml.save(path, to_mapping(file), heading)
+    with writing(path):
+        file = _CoupledFile(content, *save_arrays(path, matrices))
+        yaml.save(path, to_mapping(file), heading)
 
 
 def load_coupled(path: Path) -> CoupledScanner:

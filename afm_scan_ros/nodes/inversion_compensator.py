@@ -18,7 +18,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.learned_file import load_learned
-from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import MAX_BLOCK
@@ -29,6 +29,7 @@ from afm_scan_ros.nodes.parameters import (
     NodeParameter,
     drive_limits,
     inverses_of,
+    model_of,
 )
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
 
@@ -87,7 +88,7 @@ class InversionCompensator(BlockConsumer):
 
     def __init__(self) -> None:
         super().__init__()
-        self._model = load_model(Path(self.settings["model_file"]))
+        self._model = model_of(self.settings)
         for axis in self._model.axes:
             for effect, _ in self._model.axis(axis).effects.unknown():
                 self.get_logger().warning(f"{axis}: the model does not know {effect}: left out")
@@ -102,7 +103,8 @@ class InversionCompensator(BlockConsumer):
         waits = self.settings["line_feedback"] or self.settings["adapt"]
         self.read([DESIRED, ACHIEVED] if waits else [DESIRED])
         file = self.settings["learned_file"]
-        self._learned = load_learned(Path(file)) if file else None
+        with naming("parameter learned_file"):
+            self._learned = load_learned(Path(file)) if file else None
         self._stop: int | None = None
         self.write(DRIVE, self.settings["min_subscriptions"])
 

@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
@@ -10,9 +11,11 @@ from attrs import Attribute, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files import share_directory
-from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.files.model_file import load_model
+from afm_scan_ros.files.records import from_mapping, naming
 from afm_scan_ros.ros import (
     FloatingPointRange,
     IntegerRange,
@@ -67,6 +70,12 @@ def drive_limits(settings: Mapping[str, Any]) -> DriveLimits:
         return DriveLimits(settings["voltage_limit_v"], settings["slew_limit_v_per_s"])
     except ValueError as error:
         raise InputError(f"voltage_limit_v and slew_limit_v_per_s: {error}") from error
+
+
+def model_of(settings: Mapping[str, Any]) -> ScannerModel:
+    """Load the model that a node's parameter names; raises InputError naming parameter and file."""
+    with naming("parameter model_file"):
+        return load_model(Path(settings["model_file"]))
 
 
 def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:

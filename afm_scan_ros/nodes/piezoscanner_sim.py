@@ -1,10 +1,13 @@
 """Node: the simulated piezoscanner, drive voltage in, displacement out, measured and true."""
 
 import sys
+from pathlib import Path
 
 from afm_scan_ros.core.limits import AmplifierSpec
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import AUTOSTART, min_subscriptions
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits
 from afm_scan_ros.nodes.scanner_node import TIMEOUTS, ScannerNode
@@ -36,7 +39,9 @@ class PiezoscannerSim(ScannerNode):
     )
 
     def choice(self) -> DriverChoice:
-        """Return the simulated scanner; its sensor cannot be lost."""
+        """Return the simulated scanner; its sensor cannot be lost. Refuses a wrong plant file."""
+        with naming("parameter plant_file"):
+            load_plant(Path(self.settings["plant_file"]))
         limits = drive_limits(self.settings)
         settings = ScannerSettings(
             AmplifierSpec(limits.voltage, limits.slew, limits.slew),

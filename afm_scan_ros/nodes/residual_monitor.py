@@ -1,7 +1,6 @@
 """Node: monitors the residual of a scan, and raises an alarm above the detection limit."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -20,10 +19,10 @@ from afm_scan_ros.core.learning.adaptation import EXPECTED, Adaptation, AxisStat
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.streams import Aligner, LineError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter
+from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter, model_of
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
 
 
@@ -49,7 +48,7 @@ class ResidualMonitor(StreamReader):
 
     def __init__(self) -> None:
         super().__init__()
-        self._model = load_model(Path(self.settings["model_file"]))
+        self._model = model_of(self.settings)
         self._aligner = Aligner((DRIVE.name, ACHIEVED.name))
         self._watch = ResidualWatch(self.settings["alarm"], self.settings["alarm_lines"])
         self._residuals: LineResiduals | None = None

@@ -28,4 +28,4 @@ class ScannerDriver(ScannerNode):
             raise InputError("parameter driver: give it, as -p driver:=mylab:Stage")
         with naming("parameter settings_file"):
             file = settings_file(driver, self.settings["settings_file"])
-        return load_settings(driver, file)
+            return load_settings(driver, file)

@@ -1,16 +1,20 @@
 """Node: publishes the desired displacement of a scan."""
 
-from pathlib import Path
-
 from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
-from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, scan_spec
+from afm_scan_ros.nodes.parameters import (
+    MODEL_FILE,
+    NodeParameter,
+    inverses_of,
+    model_of,
+    scan_spec,
+)
 from afm_scan_ros.nodes.topics import DESIRED, RUNNING
 from afm_scan_ros.ros import Message, Trigger
 
@@ -39,7 +43,7 @@ class TrajectoryGenerator(BlockSource):
         info = evolve(
             info_of_scan(self._spec, *self.identity()),
             inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
-            model_hash=model_hash(load_model(Path(self.settings["model_file"]))),
+            model_hash=model_hash(model_of(self.settings)),
             nodes=self.nodes(),
         )
         self.announce(info)

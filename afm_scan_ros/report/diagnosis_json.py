@@ -21,6 +21,7 @@ from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.close_loop import reported
 from afm_scan_ros.report.diagnosis_text import (
     caution_text,
@@ -75,7 +76,7 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
 
 def save_diagnosis(path: Path, document: Document) -> None:
     """Write a document; numbers that are not finite have no place in it."""
-    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", "utf-8")
+    write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
 def _suggestion(found: Suggestion) -> Document:

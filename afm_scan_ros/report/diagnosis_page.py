@@ -158,7 +158,6 @@ def _residual(found: ResidualReport, axis: str, drawn: bytes) -> Iterator[str]:
 
 def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Provenance) -> None:
     """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = pictures(found)
     save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
     head = f"{heading}\n{heading_lines(of)}"
@@ -217,7 +216,6 @@ def coupled_next_steps(found: CoupledDiagnosis) -> Iterator[str]:
 
 def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Provenance) -> None:
     """Write diagnosis.json, the extended model and the report."""
-    folder.mkdir(parents=True, exist_ok=True)
     save_diagnosis(folder / "diagnosis.json", {**coupled_document(found), "provenance": plain(of)})
     save_coupled(folder / "model.extended.yaml", found.model, f"{heading}\n{heading_lines(of)}")
     parts = (

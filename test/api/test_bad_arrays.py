@@ -32,12 +32,17 @@ BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "words": ({"drive": ["1", "2"]}, "drive is of type <U1"),
     "complex": ({"drive": GOOD + 1j}, "drive is of type complex128"),
     "ragged": ({"drive": [[1.0], [1.0, 2.0]]}, "drive is no array"),
-    "no period": ({"sample_period": 0.0}, "sample_period is 0 s: give a positive"),
-    "negative period": ({"sample_period": -1e-4}, "sample_period is -0.0001 s"),
-    "NaN period": ({"sample_period": np.nan}, "sample_period is nan s"),
-    "infinite period": ({"sample_period": np.inf}, "sample_period is inf s"),
+    "no period": ({"sample_period": 0.0}, "sample_period is 0.0: give a positive number, in s"),
+    "negative period": ({"sample_period": -1e-4}, "sample_period is -0.0001: give"),
+    "NaN period": ({"sample_period": np.nan}, "sample_period is nan: give"),
+    "infinite period": ({"sample_period": np.inf}, "sample_period is inf: give"),
     "period in words": ({"sample_period": "fast"}, "sample_period is 'fast'"),
-    "axis twice": ({"axes": "xx", "drive": PLANE, "displacement": PLANE}, "axes names 'x' twice"),
+    "period as a truth": ({"sample_period": True}, "sample_period is True: give"),
+    "axis twice": (
+        {"axes": ("x", "x"), "drive": PLANE, "displacement": PLANE},
+        "axes names 'x' twice",
+    ),
+    "axes as a word": ({"axes": "xy"}, r"axes is of type str: give names of axes, as \('x', 'y'\)"),
     "no axis": ({"axes": ()}, "axes is empty"),
     "unknown kind": ({"kind": "noise"}, "kind 'noise' is unknown: give one of creep, frequency"),
     "unknown start": ({"start": "rest"}, "start 'rest' is unknown"),
@@ -56,7 +61,7 @@ def test_a_bad_record_is_refused(changed: dict[str, Any], reason: str) -> None:
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"axes": ("z",)}, "axes names 'z', which is unknown: choose among x, y"),
+        ({"axes": ("z",), "name": "a.mcap"}, "^a.mcap: its axes are z: name them x and y, unless"),
         ({"drive": PLANE}, "drive has 2 channels, but the axes are x"),
     ],
 )
@@ -76,9 +81,12 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
     "one axis of two": (lambda m: m.invert(GOOD, 1e-4), r"desired has 1 channel, but .* x, y"),
     "three axes": (lambda m: m.predict(np.zeros((9, 3)), 1e-4), "drive has 3 channels"),
     "NaN drive": (lambda m: m.predict(np.full((9, 2), np.nan), 1e-4), "drive is nan at sample 0"),
-    "period": (lambda m: m.invert(PLANE, 0.0), "sample_period is 0 s"),
+    "period": (lambda m: m.invert(PLANE, 0.0), "sample_period is 0.0: give"),
     "unknown effect": (lambda m: m.invert(PLANE, 1e-4, ["drift"]), "no inverse is named 'drift'"),
-    "one effect as a word": (lambda m: m.invert(PLANE, 1e-4, "creep"), r"effects is 'creep'"),
+    "one effect as a word": (
+        lambda m: m.invert(PLANE, 1e-4, "creep"),
+        r"effects is of type str: give a list of effects, as \['creep'\]",
+    ),
     "drive beyond the model": (
         lambda m: m.predict(np.outer(GOOD, [9.0, 0.0]), 1e-4),
         r"drive is 4.041 V at sample 22, and the model was identified to 4 V",
@@ -126,7 +134,51 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
     ),
     "pitch in words": (
         lambda _: afm.identify_from_images([IMAGE], "10um"),  # type: ignore[arg-type] # as above
-        "pitch is '10um': give the grating's pitch in m",
+        "pitch is '10um': give a positive number, in m, as 10e-6",
+    ),
+    "pitch as a truth": (
+        lambda _: afm.identify_from_images([IMAGE], True),  # noqa: FBT003 - what is refused
+        "pitch is True: give a positive number",
+    ),
+    "no accuracy": (
+        lambda _: afm.identify_from_images([IMAGE], 1e-5, accuracy=0.0),
+        "accuracy is 0.0: give a positive number",
+    ),
+    "a bag's path as records": (
+        lambda m: afm.diagnose(m, "bag"),  # type: ignore[arg-type] # as above
+        r"records is of type str: give a list of records, as \[afm.read_record\(path\)\]",
+    ),
+    "a length of no experiment": (
+        lambda m: afm.diagnose(m, [record()], longest=-1.0),
+        "longest is -1.0: give a positive number, in s",
+    ),
+    "few levels": (
+        lambda _: afm.identify([record()], levels=2),
+        "levels is 2: give a whole number, 3 or more",
+    ),
+    "one number as an order": (
+        lambda _: afm.identify([record()], order=4),  # type: ignore[arg-type] # as above
+        r"order is 4: give poles and zeros, as \(4, 3\)",
+    ),
+    "no poles": (
+        lambda _: afm.identify([record()], order=(0, 0)),
+        "order, poles is 0: give a whole number, 1 or more",
+    ),
+    "no states": (
+        lambda _: afm.identify([record()], states=0),
+        "states is 0: give a whole number, 2 or more",
+    ),
+    "an effect in the feedback as a word": (
+        lambda _: afm.identify([record()], effects="maxwell_slip"),
+        r"effects is of type str: give names of effects, as \['maxwell_slip'\]",
+    ),
+    "scans in words": (
+        lambda m: afm.learn(m, afm.ScanSpec(), lambda drive: drive, scans="few"),  # type: ignore[arg-type] # as above
+        "scans is 'few': give a whole number",
+    ),
+    "rows in words": (
+        lambda _: afm.read_record(__file__, skip_rows="two"),  # type: ignore[arg-type] # as above
+        "skip_rows is 'two': give a whole number, 0 or more",
     ),
     "scales in words": (
         lambda _: afm.identify_from_images([IMAGE], 1e-5, "high"),
@@ -160,16 +212,26 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
         lambda _: afm.DriveLimits(-1.0, 1e5),
         "voltage = -1.0: give a number above 0",
     ),
-    "a number as a path": (
-        lambda _: afm.read_record(3),  # type: ignore[arg-type] # as above
-        "path is of type int: give a path",
-    ),
-    "a number as a model's path": (
-        lambda _: afm.load_model(3),  # type: ignore[arg-type] # as above
-        "path is of type int: give a path",
+    "a limit as a truth": (
+        lambda _: afm.DriveLimits(True, 1e5),  # noqa: FBT003 - what is refused
+        "voltage = True: give a number above 0",
     ),
     "a short record": (lambda m: afm.diagnose(m, [record()]), "record 1: holds 50 samples"),
 }
+
+
+@pytest.mark.parametrize("given", [3, b"scan", "", None])
+def test_what_is_no_path_is_refused_with_an_example(model: afm.Model, given: Any) -> None:  # noqa: ANN401 - whatever may be wrong
+    calls: list[tuple[Callable[[Any], object], str]] = [
+        (afm.read_record, "scan.mcap"),
+        (afm.read_image, "grating.gwy"),
+        (model.save, "model.yaml"),
+    ]
+    if given is not None:
+        calls.append((afm.load_model, "model.yaml"))
+    for call, example in calls:
+        with pytest.raises(afm.InputError, match=rf"^path is .*: give a path, as '{example}'$"):
+            call(given)
 
 
 @pytest.mark.parametrize(("call", "reason"), BAD_CALLS.values(), ids=BAD_CALLS)
@@ -222,11 +284,11 @@ def too_far() -> object:
     return afm.load_model().predict(np.full((50, 2), 1e3), 1e-4)
 
 
-def in_words() -> object:
-    return record(sample_period="fast")
+def one_number() -> object:
+    return afm.identify([record()], order=4)  # type: ignore[arg-type] # what is refused
 
 
-@pytest.mark.parametrize("call", [missing, too_far, in_words])
+@pytest.mark.parametrize("call", [missing, too_far, one_number])
 def test_no_inner_error_stands_before_what_is_reported(call: Callable[[], object]) -> None:
     """The message names all that an inner error knows, so a traceback shows it alone."""
     with pytest.raises(afm.InputError) as refused:

@@ -59,6 +59,14 @@ def test_without_a_command_it_says_which_there_are(
     assert all(f"\n  {name}" in message.out for name in command.COMMANDS)
 
 
+def test_the_help_lists_each_exit_status() -> None:
+    """Those that the command ends with, in the sentence that lists them, and no others."""
+    said = " ".join(str(command.cli.help).split())
+    listed = re.findall(r"(?:^|; )(\d+) ", said.partition("Exit status: ")[2])
+    ends = (command.BAD_INPUT, command.DOES_NOT_HOLD, command.INTERRUPTED)
+    assert [int(status) for status in listed] == [0, *ends]
+
+
 def test_version(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     del capsys
     assert run("--version") == (0, "")

@@ -205,6 +205,21 @@ def test_a_real_scanner_without_its_own_model_is_refused(
     assert not Path("none").exists()
 
 
+@pytest.mark.parametrize("scanner", ["files", "nidaqmx", "mylab:Stage"])
+def test_all_that_a_scanner_lacks_is_named_at_once(scanner: str) -> None:
+    done = CliRunner().invoke(scan, ["--scanner", scanner, "--bag", "none"])
+    settings = f"--scanner {scanner}: give its settings, as --scanner {scanner}:stage.yaml"
+    assert str(done.exception).startswith(f"{settings}; give this scanner's model by --model FILE")
+    done = CliRunner().invoke(scan, ["--scanner", scanner, *MODEL, "--bag", "none"])
+    assert str(done.exception) == settings
+
+
+@pytest.mark.parametrize("scanner", ["", "stage", "mylab:"])
+def test_a_scanner_of_no_form_is_refused_with_the_forms(scanner: str) -> None:
+    done = CliRunner().invoke(scan, ["--scanner", scanner, "--bag", "none"])
+    assert str(done.exception).startswith(f"--scanner {scanner!r}: give sim, external, files:FILE")
+
+
 @pytest.mark.parametrize(
     ("scanner", "given"), [("mylab:Stage:none.yaml", MODEL), ("simulated:none.yaml", [])]
 )

@@ -148,6 +148,24 @@ def test_an_image_of_lines_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "m.yaml").exists()
 
 
+@pytest.mark.parametrize("option", [[], ["--correct"]])
+def test_a_damaged_image_is_named_with_its_damage_and_nothing_is_written(
+    tmp_path: Path, option: list[str]
+) -> None:
+    pytest.importorskip("gwyfile")
+    for name, seed in (("whole", 1), ("cut", 2)):
+        heights = 1e-9 * np.random.default_rng(seed).standard_normal((2, 16, 16))
+        sides = {"trace": heights[0], "retrace": heights[1]}
+        np.savez(tmp_path / f"{name}.npz", line_time=1.0, range_x=1e-5, range_y=1e-5, **sides)
+    cut = tmp_path / "cut.npz"
+    cut.write_bytes(cut.read_bytes()[:-100])
+    words = ["grating", str(tmp_path / "whole.npz"), *option, str(cut), "--pitch", "1um"]
+    words += ["--out", str(tmp_path / "out/m.yaml"), "--images", str(tmp_path / "out/images")]
+    with pytest.raises(InputError, match=rf"^{cut}: .* damaged or cut short"):
+        CliRunner().invoke(cli, words, catch_exceptions=False)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_trace_alone_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "trace.npz"
     np.savez(path, trace=np.zeros((16, 16)), range_x=1e-5, range_y=1e-5, line_time=1.0)

@@ -54,6 +54,13 @@ def test_a_drive_beyond_the_limit_is_status_3(invert: Invert, tmp_path: Path) ->
     assert not (tmp_path / "drive.csv").exists()
 
 
+def test_a_limit_of_zero_is_refused_by_the_option_s_name(invert: Invert) -> None:
+    status, message = invert(PATH, "time_s,desired_x_um,desired_y_um", "--limit", "0V")
+    assert status == 2
+    assert "--limit" in message
+    assert "give a positive number" in message
+
+
 def test_a_path_of_other_axes_is_refused_by_what_is_lacking(invert: Invert) -> None:
     status, message = invert(PATH[:, :1], "time_s,desired_x_um")
     assert status == 2

@@ -18,6 +18,7 @@ from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli import survey as command
 from afm_scan_ros.cli.survey import survey
 from afm_scan_ros.cli.workers import WorkerOptions
+from afm_scan_ros.core.diagnosis import diagnosis as core_diagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import share_directory, survey_files
@@ -89,13 +90,16 @@ def rows(out: Path) -> list[dict[str, Any]]:
     return found
 
 
-def test_a_survey_describes_no_residual(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No row holds the description, and it takes longer than most diagnoses."""
+def test_a_survey_describes_no_residual_and_starts_no_threads(
+    recorded: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No row holds the description, which takes longer than most diagnoses."""
 
-    def describing(_: object) -> None:
+    def refused(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(api_diagnosis, "report_residual", describing)
+    monkeypatch.setattr(api_diagnosis, "report_residual", refused)
+    monkeypatch.setattr(core_diagnosis, "in_parallel", refused)
     bag = str(recorded / "left/night_0")
     found = survey_bag(Assignment(bag, "left", "", str(MODEL), ""))
     assert (found.verdict, found.error) == ("model_sufficient", "")

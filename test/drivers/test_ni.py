@@ -5,6 +5,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
@@ -18,9 +19,9 @@ from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
-from helpers.ni_twin import BUFFER, outputs, settings_file, twin
+from helpers.ni_twin import BUFFER, ROOT, outputs, settings_file, twin
 
-pytest.importorskip("nidaqmx")  # an extra, which a ROS machine need not have
+watchdog = pytest.importorskip("nidaqmx.system.watchdog")  # a ROS machine need not have the extra
 pytest.importorskip("grpc")
 
 PERIOD, COUNT, BLOCK = 1e-4, 4000, 500
@@ -64,6 +65,38 @@ def test_the_samples_are_those_of_the_scanner_alone_and_the_outputs_come_to_rest
     expected = np.concatenate([np.zeros_like(held), whole, held, np.stack([ramp.x, ramp.y], 1)])
     np.testing.assert_array_equal(out[: len(expected)], expected)
     assert not np.any(out[len(expected) :])
+
+
+def test_the_documented_driver_refreshes_its_watchdog_and_ends_it_after_the_ramp(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """NI's watchdog is a substitute: no protocol of a server has been written for it."""
+    page = (ROOT / "docs/how_to/hardware.md").read_text("utf-8")
+    (block,) = re.findall(r"^```py\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "watched.py").write_text(block, "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    task = create_autospec(watchdog.WatchdogTask, instance=True)
+    made = create_autospec(watchdog.WatchdogTask, return_value=task)
+    monkeypatch.setattr(watchdog, "WatchdogTask", made)
+    with twin(tmp_path) as server:
+        choice = load_settings("nidaqmx", settings_file(tmp_path, server))
+        options = {**choice.options, "watchdog_s": 5.0}
+        driver = GuardedDriver("watched:Watched", choice.settings, options, choice.where)
+        driver.start(PERIOD)
+        first, second, *_ = blocks()
+        driver.advance(first, last=False)
+        driver.advance(second, last=True)
+        assert not task.close.called
+        driver.ramp_down()
+        np.testing.assert_array_equal(outputs(tmp_path)[-1], [0.0, 0.0])
+    assert made.call_args.kwargs == {"timeout": 5.0}
+    steps = [call[0] for call in task.method_calls]
+    assert steps == ["cfg_watchdog_ao_expir_states", "start", *["reset_timer"] * 3, "close"]
+    (rest,) = task.cfg_watchdog_ao_expir_states.call_args.args
+    assert [(each.physical_channel, each.expiration_state) for each in rest] == [
+        ("Dev1/ao0", 0.0),
+        ("Dev1/ao1", 0.0),
+    ]
 
 
 FAULTS = {

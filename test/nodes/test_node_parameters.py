@@ -37,15 +37,19 @@ def start() -> Iterator[Start]:
     ros.try_shutdown()
 
 
-def parameters_of(name: str) -> dict[str, NodeParameter]:
+def kind_of(name: str) -> type[ScanNode]:
     module = import_module(f"afm_scan_ros.nodes.{name}")
     (kind,) = (
         value
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, ScanNode) and vars(value).get("NAME")
     )
+    return kind
+
+
+def parameters_of(name: str) -> dict[str, NodeParameter]:
     scan = scan_spec_parameters() if name == "trajectory_generator" else []
-    return {parameter.name: parameter for parameter in (*COMMON, *kind.PARAMETERS, *scan)}
+    return {each.name: each for each in (*COMMON, *kind_of(name).PARAMETERS, *scan)}
 
 
 @pytest.mark.parametrize("value", [".nan", ".inf", "-.inf"])
@@ -138,3 +142,22 @@ def test_none_stands_for_no_inverse() -> None:
     assert inverses_of(["creep", "vibration"], known) == {"creep", "vibration"}
     with pytest.raises(InputError, match="'creeep' is not one of creep"):
         inverses_of(["creeep"], known)
+
+
+@pytest.mark.parametrize(
+    ("node", "parameter", "others"),
+    [
+        ("inversion_compensator", "model_file", []),
+        ("inversion_compensator", "learned_file", []),
+        ("residual_monitor", "model_file", []),
+        ("trajectory_generator", "model_file", []),
+        ("piezoscanner_sim", "plant_file", []),
+        ("scanner_driver", "settings_file", ["driver:=simulated"]),
+    ],
+)
+def test_a_file_that_is_missing_is_named_with_its_parameter(
+    start: Start, node: str, parameter: str, others: list[str]
+) -> None:
+    start(f"{parameter}:=nowhere.yaml", *others)
+    with pytest.raises(InputError, match=rf"^parameter {parameter}: nowhere.yaml: no such file"):
+        kind_of(node)()

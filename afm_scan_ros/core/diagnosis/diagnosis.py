@@ -117,8 +117,10 @@ def diagnose(
     progress: ProgressCallback = lambda _: None,
     healthy: Sequence[Observation] = (),
     longest: float = LONGEST,
+    *,
+    parallel: bool = True,
 ) -> ScannerDiagnosis:
-    """Diagnose every axis that the model and all records have.
+    """Diagnose every axis that the model and all records have, in threads if ``parallel``.
 
     Records of the ``healthy`` scanner tell the model's error. ``progress`` is called with the axis
     and the candidate that is being fitted. A proposed experiment lasts at most ``longest`` s.
@@ -129,7 +131,7 @@ def diagnose(
         raise InputError("no record is given: give one bag or more")
     unlike = tuple(unlike_healthy(model, healthy))
     model = with_healthy(model, healthy)
-    by_axis = in_parallel(
+    by_axis = (in_parallel if parallel else _in_turn)(
         lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
         _axes_of_all(model, observations),
     )
@@ -238,6 +240,10 @@ def in_parallel(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
     for name, result in results.items():
         Thread(target=_fulfil, args=(result, task, name), daemon=True).start()
     return {name: result.result() for name, result in results.items()}
+
+
+def _in_turn(task: Callable[[str], T], names: Iterable[str]) -> dict[str, T]:
+    return {name: task(name) for name in names}
 
 
 def _fulfil(result: "Future[T]", task: Callable[[str], T], name: str) -> None:

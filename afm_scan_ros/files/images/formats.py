@@ -11,6 +11,7 @@ from attrs import frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import ImageChannel, Signal, chosen, image_of
+from afm_scan_ros.files.paths import path_of, writing
 
 HERE = "afm_scan_ros.files.images"
 INSTALL = "pip install 'afm_scan_ros[images]'"
@@ -70,7 +71,7 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
     names the file and the fix, for a file that is missing, damaged or of another format. So it does
     for a channel that is not there, and for a package that is not installed.
     """
-    path = Path(path)
+    path = path_of(path, "grating.gwy")
     known = FORMATS.get(path.suffix.lower())
     if known is None:
         raise InputError(f"{path}: no format of images that is known: give {', '.join(FORMATS)}")
@@ -120,8 +121,8 @@ def write_image(
             raise InputError(f"{path}: two channels would be in {target.name}: rename one")
         if target.exists():
             raise InputError(f"{target} exists already: give another file or remove it")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    module.write(targets, channels, stated, signals)
+    with writing(path):
+        module.write(targets, channels, stated, signals)
     return targets
 
 

@@ -44,12 +44,12 @@ def read(path: Path) -> Sequence[FoundChannel]:
 
 def _facts(path: Path, values: Mapping[str, NDArray[Any]]) -> ScanFacts:
     def number(name: str) -> float | None:
-        return float(_numbers(path, name, values[name]).item()) if name in values else None
+        return _number(path, name, values[name]) if name in values else None
 
     upward = number("upward")
     return ScanFacts(
-        float(_numbers(path, "range_x", values["range_x"]).item()),
-        float(_numbers(path, "range_y", values["range_y"]).item()),
+        _number(path, "range_x", values["range_x"]),
+        _number(path, "range_y", values["range_y"]),
         number("line_time"),
         None if upward is None else bool(upward),
         number("overscan"),
@@ -58,6 +58,12 @@ def _facts(path: Path, values: Mapping[str, NDArray[Any]]) -> ScanFacts:
 
 def _text(values: Mapping[str, NDArray[Any]], name: str, default: str) -> str:
     return str(values[name].item()) if name in values else default
+
+
+def _number(path: Path, name: str, array: NDArray[Any]) -> float:
+    if array.size != 1:
+        raise InputError(f"{path}: {name} has shape {array.shape}: give one number")
+    return float(_numbers(path, name, array).item())
 
 
 def _numbers(path: Path, name: str, array: NDArray[Any]) -> NDArray[np.float64]:

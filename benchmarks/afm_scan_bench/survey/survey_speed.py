@@ -34,7 +34,11 @@ BAGS = 100
 WORKERS = (1, 2)
 WARM = 4
 """Bags for each worker, before time is taken."""
-DASK = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
+DASK = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.worker.memory.monitor_interval": "1s",
+}
 """Settings of the scheduler and the workers, as docs/how_to/survey.md gives them."""
 SPEC = evolve(BENCH_SPEC, lines=40, samples_per_line=2000)
 COLUMNS = {

@@ -93,6 +93,7 @@ ARCHIVES = {
     "no array 'range_x': add it": {"trace": TRACE, "range_y": 1.0},
     "unknown key 'retrase'; did you mean 'retrace'?": {"trace": TRACE, "retrase": TRACE},
     "trace holds complex128: give real numbers": {"trace": 1j * TRACE},
+    "range_x has shape (2,): give one number": {"trace": TRACE, "range_x": np.ones(2)},
     "trace (8, 9) and retrace (9, 8) differ": {"trace": TRACE, "retrace": TRACE.T},
     "not a finite number in line 0, pixel 0": {"trace": np.full((8, 8), np.nan)},
     "an image of shape (3, 9)": {"trace": TRACE[:3]},
