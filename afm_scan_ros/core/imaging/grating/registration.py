@@ -297,13 +297,13 @@ def _cell_weights(missed: Sequence[Missed], steady: Sequence[Array], cell: UnitC
 
     Heights that are not ``steady`` do not count.
     """
-    result = []
+    result: list[Array] = []
     for each, counts, numbers in zip(missed, steady, _numbers(missed, cell), strict=True):
         index = np.unique(numbers, return_inverse=True)[1].ravel()
         count = np.bincount(index, counts.ravel())
         total = np.bincount(index, (counts * each.weight * each.residual**2).ravel())
         square = total[count > 0.0] / count[count > 0.0]
-        likely = np.ones_like(total)
+        likely = np.ones(len(count))
         likely[count > 0.0] = (FREEDOM + 1.0) / (FREEDOM + square / np.median(square))
         result.append(likely[index].reshape(each.u.shape))
     return result
