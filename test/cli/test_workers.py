@@ -72,7 +72,6 @@ def test_the_work_is_done_in_as_many_other_processes() -> None:
 
 def faults(_: int) -> float:
     """Share of the pages of arrays, made and freed again and again, that fault each time."""
-
     length, arrays, times = 2**19, 8, 5
 
     def fill() -> None:
