@@ -11,9 +11,10 @@ from afm_scan_ros.api.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_typ
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.imaging.grating.figures import PITCH, ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
 from afm_scan_ros.core.imaging.grating.registered_image import (
+    PITCH,
+    ImageQuantity,
     RegisteredImage,
     both_directions,
     register_image,

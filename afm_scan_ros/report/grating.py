@@ -5,9 +5,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
+from afm_scan_ros.core.imaging.grating.registered_image import ImageQuantity
 from afm_scan_ros.core.imaging.grating.registration import RIPPLES
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import BaseEffects, Status

@@ -5,9 +5,12 @@ import pytest
 from attrs import evolve
 from scipy import signal
 
-from afm_scan_ros.core.imaging.grating.figures import ImageQuantity
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
-from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, both_directions
+from afm_scan_ros.core.imaging.grating.registered_image import (
+    ImageQuantity,
+    RegisteredImage,
+    both_directions,
+)
 from afm_scan_ros.core.imaging.predicted import PER_PIXEL, LineDrive
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
