@@ -91,6 +91,27 @@ class MotionForm:
         both = np.multiply.outer(np.multiply.outer(lines, pixels), coefficients[-1])
         return np.asarray(fast[np.newaxis] + slow[:, np.newaxis] + both)
 
+    def gaps(self, coefficients: Array, overscan: float) -> Array:
+        """Trace less retrace at the turn before the line, and at that behind it: (2, many).
+
+        The parabola through the outer half of the line goes on through the ``overscan``.
+        """
+        found = []
+        for end in (-1.0, 1.0):
+            pixels = end * np.linspace(0.5, 1.0, 9)
+            sides = (slice(0, self.fast), slice(self.fast, 2 * self.fast))
+            trace, retrace = (self.along(pixels) @ coefficients[side] for side in sides)
+            parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
+            turn = end * (1.0 + 2.0 * overscan)
+            found.append(np.polynomial.polynomial.polyval(turn, parabola))
+        return np.array(found)
+
+    def retrace_moved(self, coefficients: Array, distance: Array) -> Array:
+        """Coefficients (count, many) whose retrace is moved by a distance (many,)."""
+        moved = coefficients.copy()
+        moved[self.fast : 2 * self.fast] += distance
+        return moved
+
     def coarse(self, direction: int) -> Array:
         """Factors of the coefficients at a coarse grid over the image: (COARSE**2, count)."""
         line, pixel = np.meshgrid(middles(COARSE), middles(COARSE), indexing="ij")

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.imaging.grating.equations import (
     Indices,
     Missed,
@@ -93,8 +93,8 @@ class Registration:
 def register(image: ScanImage, pitch: float) -> Registration:
     """Register trace and retrace of an image, or its trace alone; ``pitch`` in m.
 
-    Raises InputError where no lattice of two directions is found, and ScanError where the turns do
-    not settle.
+    Raises InputError where no lattice of two directions is found, or trace and retrace do not meet
+    at the turns, and ScanError where the motion does not settle.
     """
     seen = [each for each in (image.trace, image.retrace) if each is not None]
     given = [levelled(each) for each in seen]
@@ -124,6 +124,8 @@ def register(image: ScanImage, pitch: float) -> Registration:
     if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
         state = _judged(rippling)
     state = _settled(state, image.name)
+    if len(given) == 2:  # noqa: PLR2004 - trace and retrace
+        state = state.meeting(image.overscan)
     return state.registration(share * pitch)
 
 
@@ -259,6 +261,21 @@ class _State:
             [self.form.variances(d, known) for d in range(len(self.heights))]
         )
         return float(np.sqrt(np.mean(moved**2) / np.mean(deviation)))
+
+    def meeting(self, overscan: float) -> "_State":
+        """Return the state whose retrace is moved by whole cells to meet the trace at the turns.
+
+        Whole cells change no height. Raises InputError where the turns ask for different numbers.
+        """
+        gaps = self.form.gaps(self.coefficients, overscan)
+        whole = np.rint(gaps)
+        if np.any(whole[0] != whole[1]):
+            raise InputError(
+                "which cell of the trace is which of the retrace is not clear, as they are"
+                f" {np.abs(gaps).max():.2g} cells apart at a turn: give an image of a smaller range"
+            )
+        moved = self.form.retrace_moved(self.coefficients, whole[0])
+        return evolve(self, coefficients=moved)
 
     def registration(self, pitch: float) -> Registration:
         """Return what was found."""

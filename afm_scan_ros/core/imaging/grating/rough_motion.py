@@ -8,10 +8,8 @@ the same column, so its shift is sought by trial.
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.grating.equations import Indices
 from afm_scan_ros.core.imaging.grating.features import (
     Cells,
     Lattice,
@@ -43,18 +41,20 @@ def first_motion(
 ) -> tuple[MotionForm, Array, float]:
     """Return a rough motion of an image by its cells, found one by one: (count, 2).
 
-    The third value is the distance of neighbouring cells over ``pitch``. Raises InputError where
-    the grating has a shorter period than that pitch, or trace and retrace do not meet at the turns.
+    Trace and retrace, numbered apart, meet at the turns within a cell. The third value is the
+    distance of neighbouring cells over ``pitch``. Raises InputError where the grating has a shorter
+    period than that pitch.
     """
     nominal = (pitch / image.range_y * image.lines, pitch / image.range_x * image.pixels)
     lattice = lattice_of(heights[0], nominal)
     form = MotionForm(image.lines, image.pixels, ROUGH, ROUGH)
     cells = cells_of(heights, lattice.vectors)
     _refuse_shorter(image, lattice, pitch)
+    coefficients = _through(form, cells)
     if len(cells) == 2:  # noqa: PLR2004 - trace and retrace
-        apart = _whole_cells_apart(form, cells, image.overscan)
-        cells[1] = evolve(cells[1], numbers=cells[1].numbers + apart)
-    return form, _through(form, cells), lattice.share
+        apart = form.gaps(coefficients, image.overscan).mean(axis=0)
+        coefficients = form.retrace_moved(coefficients, np.rint(apart))
+    return form, coefficients, lattice.share
 
 
 def _refuse_shorter(image: ScanImage, lattice: Lattice, pitch: float) -> None:
@@ -69,10 +69,9 @@ def _refuse_shorter(image: ScanImage, lattice: Lattice, pitch: float) -> None:
         )
 
 
-def _through(form: MotionForm, cells: Sequence[Cells], first: int = 0) -> Array:
+def _through(form: MotionForm, cells: Sequence[Cells]) -> Array:
     """Coefficients (count, 2) that give the cells of one direction or both their numbers."""
-    pairs = list(enumerate(cells, start=first))
-    basis = np.vstack([form.rows(d, *_relative(form, each.places)) for d, each in pairs])
+    basis = np.vstack([form.rows(d, *_relative(form, c.places)) for d, c in enumerate(cells)])
     known = np.vstack([each.numbers for each in cells]).astype(float)
     return _solved(form, basis, known)
 
@@ -90,29 +89,6 @@ def _relative(form: MotionForm, places: Array) -> tuple[Array, Array]:
         (2.0 * places[:, 0] + 1.0) / form.lines - 1.0,
         (2.0 * places[:, 1] + 1.0) / form.pixels - 1.0,
     )
-
-
-def _whole_cells_apart(form: MotionForm, cells: Sequence[Cells], overscan: float) -> Indices:
-    """Whole cells to add to the retrace's numbers, so that it meets the trace at the turns.
-
-    What lies between trace and retrace is a parabola, nearly zero at either turn. Raises InputError
-    where the two turns ask for different numbers.
-    """
-    pixels = np.linspace(-1.0, 1.0, 9)
-    middle = np.zeros_like(pixels)
-    trace, retrace = (
-        form.rows(d, middle, pixels) @ _through(form, [each], d) for d, each in enumerate(cells)
-    )
-    turns = np.array([-1.0, 1.0]) * (1.0 + 2.0 * overscan)
-    parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
-    gaps = np.polynomial.polynomial.polyval(turns, parabola)
-    whole: Indices = np.rint(gaps).astype(np.int64)
-    if np.any(whole[:, 0] != whole[:, 1]):
-        raise InputError(
-            "which cell of the trace is which of the retrace is not clear, as they are"
-            f" {np.abs(gaps).max():.2g} cells apart at a turn: give an image of a smaller range"
-        )
-    return whole[:, 0]
 
 
 def carried_over(
