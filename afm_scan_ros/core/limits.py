@@ -15,9 +15,7 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 def _above_zero(_: object, attribute: "Attribute[float]", value: object) -> None:
-    if isinstance(value, bool) or not (
-        isinstance(value, Real) and float(value) > 0.0
-    ):  # NaN is not
+    if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:  # or NaN
         raise InputError(f"{attribute.name} = {value!r}: give a number above 0")
 
 

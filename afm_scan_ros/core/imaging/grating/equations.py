@@ -56,7 +56,7 @@ class Missed:
         slopes = np.stack([self.slope_u, self.slope_v])
         return np.asarray(np.einsum("lp,ilp,jlp->lij", likely * self.weight, slopes, slopes))
 
-    def group(self) -> NDArray[np.int64]:
+    def group(self) -> Indices:
         """Group of each pixel's cell."""
         number = (np.floor(self.u) + APART * np.floor(self.v)) % GROUPS
         return np.asarray(number, dtype=np.int64)
@@ -122,8 +122,11 @@ class MotionEquations:
 
     def covariance(self, prior: Array) -> Array:
         """Covariance (2 count, 2 count) of the coefficients beside a prior of that precision."""
+        return np.asarray(np.linalg.inv(self._precision(prior)))
+
+    def _precision(self, prior: Array) -> Array:
         whole = self.gram / self.excess + prior
-        return np.linalg.inv(whole + TINY * np.abs(whole).max() * np.eye(len(whole)))
+        return np.asarray(whole + TINY * np.abs(whole).max() * np.eye(len(whole)))
 
     def uncertainty(
         self,
@@ -132,21 +135,22 @@ class MotionEquations:
         weights: Sequence[Array],
         cells: Sequence[Indices],
     ) -> Array:
-        """Covariance by leaving out each cell in turn, and by what the prior keeps from the truth.
+        """Covariance (2 count, 2 count): of the cells, by a jackknife, and of the prior's bias.
 
-        ``cells`` are the numbers of each direction's cells. One cell with a fault may alone decide
-        where some lines lie: leaving it out shows that (cluster jackknife: J. G. MacKinnon, M. Ø.
-        Nielsen and M. D. Webb, J. Appl. Econometrics 38, 671, 2023).
+        ``cells`` are the numbers of each direction's cells. The equations are those of the motion
+        found, at which the moments balance the prior. The jackknife leaves out each cell in turn,
+        so it shows where one cell with a fault alone determines the position of some lines (J. G.
+        MacKinnon, M. Ø. Nielsen and M. D. Webb, J. Appl. Econometrics 38, 671, 2023).
         """
-        known = self.covariance(prior)
-        whole = np.linalg.inv(known)
-        total = np.zeros_like(whole)
+        precision, excess = self._precision(prior), self.excess
+        covariance = np.linalg.inv(precision)
+        total = np.zeros_like(precision)
         every = np.unique(np.concatenate([each.ravel() for each in cells]))
         for cell in every:
             gram, moment = self._of_cell(missed, weights, [each == cell for each in cells])
-            change = np.linalg.solve(whole - gram / self.excess, -moment / self.excess)
+            change = np.linalg.solve(precision - gram / excess, -moment / excess)
             total += np.outer(change, change)
-        return np.asarray(known @ prior @ known + (1.0 - 1.0 / len(every)) * total)
+        return np.asarray(covariance @ prior @ covariance + (1.0 - 1.0 / len(every)) * total)
 
     def _of_cell(
         self,
@@ -205,10 +209,10 @@ def _gram(form: MotionForm, direction: int, weight: Array) -> Array:
     return result
 
 
-def _moments(form: MotionForm, direction: int, group: NDArray[np.int64], weight: Array) -> Array:
+def _moments(form: MotionForm, direction: int, group: Indices, weight: Array) -> Array:
     """Sum of weight times a factor over the pixels of each group of an image: (GROUPS, count)."""
 
-    def sums(places: NDArray[np.int64], values: Array, count: int) -> Array:
+    def sums(places: Indices, values: Array, count: int) -> Array:
         index = (group * count + places).ravel()
         found: Array = np.bincount(index, values.ravel(), GROUPS * count).astype(float)
         return found.reshape(GROUPS, count)

@@ -14,6 +14,8 @@ from scipy.interpolate import BSpline, RectBivariateSpline
 from afm_scan_ros.core.types import Array
 
 CUBIC = 3
+AT_TURN = 9
+"""Places of the half of a line to which a parabola is fitted."""
 COARSE = 33
 """Lines and pixels of the grid on which a motion's uncertainty is computed."""
 
@@ -91,14 +93,15 @@ class MotionForm:
         both = np.multiply.outer(np.multiply.outer(lines, pixels), coefficients[-1])
         return np.asarray(fast[np.newaxis] + slow[:, np.newaxis] + both)
 
-    def gaps(self, coefficients: Array, overscan: float) -> Array:
-        """Trace less retrace at the turn before the line, and at that behind it: (2, many).
+    def gaps_at_turns(self, coefficients: Array, overscan: float) -> Array:
+        """Trace less retrace at the turns before and behind the line: (2, many).
 
-        The parabola through the outer half of the line goes on through the ``overscan``.
+        A parabola is fitted to the half of the line next to a turn. It is extrapolated through the
+        ``overscan``.
         """
         found = []
         for end in (-1.0, 1.0):
-            pixels = end * np.linspace(0.5, 1.0, 9)
+            pixels = end * np.linspace(0.5, 1.0, AT_TURN)
             sides = (slice(0, self.fast), slice(self.fast, 2 * self.fast))
             trace, retrace = (self.along(pixels) @ coefficients[side] for side in sides)
             parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
@@ -106,8 +109,8 @@ class MotionForm:
             found.append(np.polynomial.polynomial.polyval(turn, parabola))
         return np.array(found)
 
-    def retrace_moved(self, coefficients: Array, distance: Array) -> Array:
-        """Coefficients (count, many) whose retrace is moved by a distance (many,)."""
+    def with_retrace_shifted(self, coefficients: Array, distance: Array) -> Array:
+        """Coefficients (count, many) whose retrace is shifted by a distance (many,)."""
         moved = coefficients.copy()
         moved[self.fast : 2 * self.fast] += distance
         return moved

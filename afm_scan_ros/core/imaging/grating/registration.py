@@ -96,8 +96,8 @@ def register(image: ScanImage, pitch: float) -> Registration:
     Raises InputError where no lattice of two directions is found, or trace and retrace do not meet
     at the turns, and ScanError where the motion does not settle.
     """
-    seen = [each for each in (image.trace, image.retrace) if each is not None]
-    given = [levelled(each) for each in seen]
+    recorded = [each for each in (image.trace, image.retrace) if each is not None]
+    given = [levelled(each) for each in recorded]
     rough, coefficients, share = first_motion(image, given, pitch)
     first = rough.image(0, coefficients)
     cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
@@ -113,7 +113,7 @@ def register(image: ScanImage, pitch: float) -> Registration:
         _State.begin(
             each,
             carried_over(rough, coefficients, each, len(given)),
-            seen,
+            recorded,
             given,
             size,
             0 if image.upward else -1,
@@ -125,7 +125,7 @@ def register(image: ScanImage, pitch: float) -> Registration:
         state = _judged(rippling)
     state = _settled(state, image.name)
     if len(given) == 2:  # noqa: PLR2004 - trace and retrace
-        state = state.meeting(image.overscan)
+        state = state.with_turns_closed(image.overscan)
     return state.registration(share * pitch)
 
 
@@ -150,11 +150,15 @@ def _settled(state: "_State", name: str) -> "_State":
 
 @frozen(eq=False)
 class _State:
-    """A turn: the motion, the heights without background, and the weights of the cells."""
+    """A turn: the motion, the heights without background, and the weights of the cells.
+
+    ``recorded`` are the heights of the image, ``heights`` the same without background. Heights
+    count by their ``weights``, and not at all where ``steady`` is zero: in the line scanned first.
+    """
 
     form: MotionForm
     coefficients: Array
-    seen: Sequence[Array]
+    recorded: Sequence[Array]
     heights: Sequence[Array]
     weights: Sequence[Array]
     steady: Sequence[Array]
@@ -171,7 +175,7 @@ class _State:
         cls,
         form: MotionForm,
         coefficients: Array,
-        seen: Sequence[Array],
+        recorded: Sequence[Array],
         heights: Sequence[Array],
         size: int,
         first: int,
@@ -181,7 +185,7 @@ class _State:
         for each in even:
             each[first] = 0.0
         cell = _mean_cell(form, coefficients, heights, even, size)
-        return cls(form, coefficients, seen, heights, even, even, size, cell)
+        return cls(form, coefficients, recorded, heights, even, even, size, cell)
 
     def by_columns(self) -> "_State":
         """Return the state after each column has moved to where it fits best, and some turns."""
@@ -232,8 +236,10 @@ class _State:
         equations = MotionEquations.of(self.form, missed, weights)
         step, smoothing = equations.step(self.coefficients, self.smoothing)
         heights = [
-            seen - _background(seen - h + each.residual, each, w * each.weight)
-            for seen, h, each, w in zip(self.seen, self.heights, missed, weights, strict=True)
+            recorded - _background(recorded - level + each.residual, each, w * each.weight)
+            for recorded, level, each, w in zip(
+                self.recorded, self.heights, missed, weights, strict=True
+            )
         ]
         coefficients = self.coefficients + step
         cell = _mean_cell(self.form, coefficients, heights, weights, self.size)
@@ -262,20 +268,21 @@ class _State:
         )
         return float(np.sqrt(np.mean(moved**2) / np.mean(deviation)))
 
-    def meeting(self, overscan: float) -> "_State":
-        """Return the state whose retrace is moved by whole cells to meet the trace at the turns.
+    def with_turns_closed(self, overscan: float) -> "_State":
+        """Return the state whose retrace is shifted by whole cells to meet the trace at the turns.
 
-        Whole cells change no height. Raises InputError where the turns ask for different numbers.
+        A shift by whole cells changes no height. Raises InputError where the two turns need
+        different shifts.
         """
-        gaps = self.form.gaps(self.coefficients, overscan)
+        gaps = self.form.gaps_at_turns(self.coefficients, overscan)
         whole = np.rint(gaps)
         if np.any(whole[0] != whole[1]):
             raise InputError(
                 "which cell of the trace is which of the retrace is not clear, as they are"
                 f" {np.abs(gaps).max():.2g} cells apart at a turn: give an image of a smaller range"
             )
-        moved = self.form.retrace_moved(self.coefficients, whole[0])
-        return evolve(self, coefficients=moved)
+        shifted = self.form.with_retrace_shifted(self.coefficients, whole[0])
+        return evolve(self, coefficients=shifted)
 
     def registration(self, pitch: float) -> Registration:
         """Return what was found."""
@@ -335,7 +342,11 @@ def _numbers(missed: Sequence[Missed], cell: UnitCell) -> list[Indices]:
 
 
 def _background(residual: Array, where: Missed, weight: Array) -> Array:
-    """Parabola of the place along each line that a residual (lines, pixels) holds."""
+    """Parabola that fits a residual (lines, pixels) of each line, against the place along it.
+
+    A tilted sample adds its tilt times the place. That is no parabola of the pixel where the
+    scanner is not linear.
+    """
     ends = np.array([np.mean(each[:, -1] - each[:, 0]) for each in (where.u, where.v)])
     place = (where.u * ends[0] + where.v * ends[1]) * 2.0 / (ends @ ends)
     place -= place.mean(axis=1, keepdims=True)

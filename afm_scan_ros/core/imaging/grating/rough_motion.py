@@ -41,7 +41,7 @@ def first_motion(
 ) -> tuple[MotionForm, Array, float]:
     """Return a rough motion of an image by its cells, found one by one: (count, 2).
 
-    Trace and retrace, numbered apart, meet at the turns within a cell. The third value is the
+    The retrace is shifted by whole cells to meet the trace at the turns. The third value is the
     distance of neighbouring cells over ``pitch``. Raises InputError where the grating has a shorter
     period than that pitch.
     """
@@ -52,8 +52,8 @@ def first_motion(
     _refuse_shorter(image, lattice, pitch)
     coefficients = _through(form, cells)
     if len(cells) == 2:  # noqa: PLR2004 - trace and retrace
-        apart = form.gaps(coefficients, image.overscan).mean(axis=0)
-        coefficients = form.retrace_moved(coefficients, np.rint(apart))
+        apart = form.gaps_at_turns(coefficients, image.overscan).mean(axis=0)
+        coefficients = form.with_retrace_shifted(coefficients, np.rint(apart))
     return form, coefficients, lattice.share
 
 
