@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.grating.features import levelled
+from afm_scan_ros.core.imaging.grating.features import Cells, cells_of, lattice_of, levelled
 from afm_scan_ros.core.imaging.grating.rough_motion import first_motion
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
@@ -65,6 +66,59 @@ def test_the_grating_s_own_pitch_is_accepted(kind: str, seed: int) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_chessboard_s_pitch_may_be_the_side_of_its_cell(seed: int) -> None:
     assert period_of(drawn("chessboard", seed), PITCH / np.sqrt(2.0)) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_between_both_readings_the_heights_of_a_chessboard_decide(seed: int) -> None:
+    """A range that is 0.84 of the commanded one lies between a row and a diagonal."""
+    image = drawn("chessboard", seed)
+    nominal = 2.0**0.25 * period_seen(image)
+    assert period_of(image, nominal * PITCH) == pytest.approx(np.sqrt(0.5))
+    place = 2.0 * np.pi * np.arange(SIZE) / SIZE
+    waves = 1e-7 * np.add.outer(np.sin(8.0 * place), np.sin(8.0 * place))
+    assert period_of(ScanImage(waves, waves, 8.0, 8.0, 1.0), 2.0**0.25) == 1.0
+
+
+def period_seen(image: ScanImage) -> float:
+    """Distance of neighbouring black squares of a chessboard along the diagonal, over PITCH."""
+    pixels = (PITCH / image.range_y * image.lines, PITCH / image.range_x * image.pixels)
+    return lattice_of(levelled(image.trace), pixels).period
+
+
+@pytest.mark.parametrize(
+    ("shape", "bend"), [((3, 3), True), ((3, 2), False), ((2, 6), False), ((4, 3), True)]
+)
+def test_cells_must_show_how_both_directions_bend(shape: tuple[int, int], *, bend: bool) -> None:
+    numbers = np.argwhere(np.ones(shape))
+    assert Cells(numbers, numbers.astype(float)).bend is bend
+
+
+def image_of_discs(count: int) -> Array:
+    """Heights of three by three cells, of which so many have a disc, in all rows and columns."""
+    column, row = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
+    third, heights = SIZE / 3.0, np.zeros((SIZE, SIZE))
+    for i, k in [(0, 1), (1, 0), (1, 1), (1, 2), (2, 1), (2, 2)][:count]:
+        heights[np.hypot(row - third * (i + 0.5), column - third * (k + 0.5)) < 0.25 * third] = 1.0
+    return heights
+
+
+def test_five_cells_are_too_few_and_six_are_not() -> None:
+    vectors = np.diag([SIZE / 3.0, SIZE / 3.0])
+    assert len(cells_of([image_of_discs(6)], vectors)[0]) == 6
+    with pytest.raises(InputError, match=r"are too few \(5\)"):
+        cells_of([image_of_discs(5)], vectors)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_large_particles_do_not_hide_the_lattice(seed: int) -> None:
+    """Particles ten times as high as the cells, over two hundredths of the image."""
+    image = drawn("discs", seed)
+    rng = np.random.default_rng(seed)
+    dusty = image.trace.copy()
+    side = round(0.1 * SIZE)
+    for row, column in rng.integers(0, SIZE - side, (2, 2)):
+        dusty[row : row + side, column : column + side] += 1e-6
+    assert period_of(evolve(image, trace=dusty), PITCH) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)

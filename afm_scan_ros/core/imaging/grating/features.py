@@ -12,22 +12,30 @@ from scipy.signal import fftconvolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
+WITHOUT_DUST = (0.03, 0.97)
+"""Quantiles of the heights beyond which particles and spikes lie, and little of the cells."""
 FARTHEST = 1.6
 """Distance of neighbouring cells over the nominal pitch, up to which they are sought."""
 SQUARE = np.sin(np.pi / 3.0)
 """Least sine of the angle between two lattice vectors."""
 ALIKE = 0.5
 """Least share of the highest peak that another one of a lattice has."""
-NEGATIVE = np.sqrt(0.5)
-"""Least negative correlation of a chessboard's halfway shifts: more than half is explained."""
+NEGATIVE = 0.75
+"""Negative correlation of halfway shifts: midway between that of wide discs and a chessboard's."""
+DIAGONAL = float(np.sqrt(0.5))
+"""Side of a square over its diagonal."""
+TRUSTED = -np.log(DIAGONAL) / 3.0
+"""Logarithm of a scale that is taken for that of the scanner: a third of what lies between."""
+LEVELS = float(np.sqrt(np.pi**2 / 8.0))
+"""Rms over mean magnitude, midway between 1, of two levels, and that of a sum of two sines."""
 STARTS = 5
 """Cells from which a walk is begun in turn, as one may be damaged."""
 LIKE = 0.5
 """Least correlation of a cell with the one in the middle: more than half of it is explained."""
 AWAY = 0.3
 """Share of the lattice vector within which a neighbour may lie from where it is expected."""
-FEWEST = 9
-"""Cells, three by three, from which a lattice and its bending can be found."""
+FEWEST = 6
+"""Cells from which a motion of two parabolas, of five numbers, can be found and checked."""
 
 
 @frozen(eq=False)
@@ -42,6 +50,11 @@ class Cells:
 
     def __len__(self) -> int:
         return len(self.numbers)
+
+    @property
+    def bend(self) -> bool:
+        """Whether they show how both directions bend: three numbers along each, or more."""
+        return all(len(np.unique(numbers)) > 2 for numbers in self.numbers.T)  # noqa: PLR2004
 
 
 def levelled(heights: Array) -> Array:
@@ -59,20 +72,28 @@ class Lattice:
     """The lattice of the shortest ``vectors`` (2, 2), rows (lines, pixels).
 
     The first vector runs along the lines most, the second ahead of it. ``period`` is their length
-    over the nominal pitch. ``chessboard`` is whether the middles of the cells show the negative of
-    their corners: then the pitch may be the diagonal of a cell, or its side, as of a sum of two
-    sines.
+    over the nominal pitch. ``negative`` is whether the middles of the cells show the negative of
+    their corners: then the pitch is the diagonal of a cell, as of a chessboard, whose heights have
+    two ``levels``, or its side, as of a sum of two sines.
     """
 
     vectors: Array
     period: float
-    chessboard: bool
+    negative: bool
+    levels: bool
 
     @property
     def share(self) -> float:
-        """Distance of neighbouring cells over the pitch: the likelier one of a chessboard's two."""
-        shares = (1.0, float(np.sqrt(0.5))) if self.chessboard else (1.0,)
-        return min(shares, key=lambda share: abs(np.log(self.period / share)))
+        """Distance of neighbouring cells over the pitch: of two the one near the period, if any.
+
+        Otherwise the heights decide.
+        """
+        if not self.negative:
+            return 1.0
+        for share in (1.0, DIAGONAL):
+            if abs(np.log(self.period / share)) < TRUSTED:
+                return share
+        return DIAGONAL if self.levels else 1.0
 
 
 def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
@@ -81,7 +102,7 @@ def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
     Among the high peaks of the autocorrelation its vectors are the two shortest about at right
     angles, so that no shorter period is left. Raises InputError where there is no such pair.
     """
-    likeness = _autocorrelation(heights)
+    likeness = _autocorrelation(np.clip(heights, *np.quantile(heights, WITHOUT_DUST)))
     middle = np.array(likeness.shape) // 2
     vectors, found = _high_peaks(likeness, pitch)
     relative = vectors / np.array(pitch)
@@ -94,7 +115,7 @@ def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
         if between.max() >= ALIKE * min(found[k], found[m]):
             continue
         if abs(a[0] * b[1] - a[1] * b[0]) > SQUARE * length[k] * length[m]:
-            negative = between.min() < -NEGATIVE * min(found[k], found[m])
+            negative = between.max() < -NEGATIVE * max(found[k], found[m])
             pairs.append((length[k] * length[m], k, m, negative))
     if not pairs:
         raise InputError(
@@ -103,7 +124,13 @@ def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
         )
     area, k, m, negative = min(pairs)
     shortest = _ordered(vectors[k].astype(float), vectors[m].astype(float))
-    return Lattice(shortest, float(np.sqrt(area)), bool(negative))
+    return Lattice(shortest, float(np.sqrt(area)), bool(negative), _two_levels(heights))
+
+
+def _two_levels(heights: Array) -> bool:
+    """Whether heights lie at two levels, rather than as those of a sum of two sines."""
+    from_middle = heights - heights.mean()
+    return bool(from_middle.std() < LEVELS * np.abs(from_middle).mean())
 
 
 def _high_peaks(likeness: Array, pitch: tuple[float, float]) -> tuple[NDArray[np.int64], Array]:
@@ -166,10 +193,10 @@ def cells_of(heights: Sequence[Array], vectors: Array) -> list[Cells]:
         if not best or min(map(len, found)) > min(map(len, best)):
             best = found
     fewest = min(map(len, best))
-    if fewest < FEWEST:
+    if fewest < FEWEST or not all(each.bend for each in best):
         raise InputError(
-            f"only {fewest} cells of the grating were recognised: give an image of at least three"
-            " by three whole ones, with less noise"
+            f"the cells of the grating that were recognised are too few ({fewest}): give an image"
+            " of at least three by three whole ones, with less noise"
         )
     return best
 
