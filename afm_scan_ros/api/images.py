@@ -13,9 +13,9 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of
 from afm_scan_ros.core.imaging.grating.registered_image import (
-    PITCH,
     ImageQuantity,
     RegisteredImage,
+    accurate_ones,
     both_directions,
     register_image,
 )
@@ -65,18 +65,18 @@ def identify_from_images(
         volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
             drive of 1 V stands for a commanded position of 1 µm.
         progress: is called with what is being done.
-        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach with
-            95 % certainty.
+        accuracy: of the distance of a pitch, 1, rms over the image, that each image must reach
+            with 95 % certainty; in y only the largest images must.
 
     x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate it
     from a lag or from creep: then all that differs between trace and retrace is taken for
     hysteresis. Where line rates differ by a factor of two, creep and a resonance or a lag are
     sought in the same fit. y has a gain: that of the largest image, or the mean of the largest ones
     upwards and downwards, which is free of drift.
-    An image that shows no such grating, or whose positions do not settle, is refused, and the
-    others are used. Raises InputError where an image holds no retrace or states no time of a line,
-    and where no image is accurate enough; the error of the first image where all are refused;
-    ScanError where a fit does not converge.
+    An image that shows no such grating, whose positions do not settle or are not accurate enough,
+    is refused, and the others are used. Raises InputError where an image holds no retrace or states
+    no time of a line; the error of the first image where all are refused; ScanError where a fit
+    does not converge.
 
     >>> import numpy as np
     >>> import afm_scan_ros as afm
@@ -98,9 +98,11 @@ def identify_from_images(
     for image in given:
         _both_directions(image)
     seen, errors = _registered(given, pitch, report)
-    if not seen:
+    used, inaccurate = accurate_ones(seen, accuracy)
+    errors += inaccurate
+    if not used:
         raise errors[0]
-    found = identified_from(seen, scales, accuracy, report)
+    found = identified_from(used, scales, report)
     return evolve(found, refused=tuple(str(error) for error in errors))
 
 
@@ -124,14 +126,12 @@ def _registered(
 def identified_from(
     seen: Sequence[RegisteredImage],
     scales: tuple[float, float],
-    accuracy: float,
     progress: ProgressCallback,
 ) -> ImageIdentification:
     """Identify a scanner from images that were registered; otherwise as ``identify_from_images``.
 
     ``scales`` (V/m) are those of x and y.
     """
-    _refuse_inaccurate(seen, accuracy)
     scanner = model_of([s.image for s in seen], [s.positions for s in seen], scales, progress)
     names = ", ".join(each.image.name for each in seen)
     corrected = (_corrected_or_none(each) for each in seen)
@@ -153,18 +153,6 @@ def _corrected_or_none(seen: RegisteredImage) -> ScanImage | None:
         return _corrected(seen.image, found.trace, found.retrace, found.known)
     except InputError:
         return None
-
-
-def _refuse_inaccurate(seen: Sequence[RegisteredImage], accuracy: float) -> None:
-    """Refuse images of which none shows the pitch of both axes as accurately."""
-    worst = [max(f.value for f in each.figures if f.name == PITCH) for each in seen]
-    best = int(np.argmin(worst))
-    if worst[best] > 100.0 * accuracy:
-        raise InputError(
-            f"{seen[best].image.name}: the distance of a pitch is known to {worst[best]:.2g} % rms"
-            f" over the image (95 %), and {100.0 * accuracy:.2g} % is asked: record an image that"
-            " shows more cells, with more pixels or less noise, or allow a lower accuracy"
-        )
 
 
 def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1e6) -> ScanImage:

@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.imaging.grating.models import APART, Positions
 from afm_scan_ros.core.imaging.grating.motion import middles
 from afm_scan_ros.core.imaging.grating.registered_image import ImageQuantity
-from afm_scan_ros.core.imaging.grating.registration import RIPPLES
+from afm_scan_ros.core.imaging.grating.rough_motion import FINEST
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.model import BaseEffects, Status
 from afm_scan_ros.core.types import AXES
@@ -26,8 +27,6 @@ COLUMNS = {
 }
 FASTER = 10.0
 """Line rate to record next over that of the images."""
-FOLLOWED = 2.0 * RIPPLES
-"""Highest frequency over the line rate that the motion follows: a line is two ways."""
 TOGETHER = "upwards and downwards"
 MEANS = {"x": "lines", "y": "pixels of a line"}
 """What the motion of an axis is the mean over."""
@@ -89,8 +88,8 @@ def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
     elif x.vibration.status is Status.UNKNOWN:
         yield (
             f"x: no ripple of a resonance shows up to {fastest:.3g} Hz. One above"
-            f" {FOLLOWED * fastest:.3g} Hz would be finer than the motion is followed, so the model"
-            " has none and holds at these rates. Record a faster image to scan faster."
+            f" {max(map(_followed, images)):.3g} Hz would be finer than the motion is followed, so"
+            " the model has none and holds at these rates. Record a faster image to scan faster."
         )
     elif x.creep.status is Status.UNKNOWN:
         yield "x: the line rates show no creep. The model holds between them."
@@ -100,6 +99,12 @@ def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
         way = "downwards" if images[0].upward else "upwards"
         yield f"y: scale and drift look alike in one direction. Record one {way}."
     yield "y: creep and hysteresis look alike in images, so y is a gain alone."
+
+
+def _followed(image: ScanImage) -> float:
+    """Frequency (Hz) of the finest ripple that is sought in an image."""
+    pixel = 0.5 * (image.line_time or np.inf) / (image.pixels * (1.0 + 2.0 * image.overscan))
+    return 1.0 / (FINEST * pixel)
 
 
 @styled

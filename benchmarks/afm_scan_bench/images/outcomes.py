@@ -12,12 +12,17 @@ from afm_scan_bench.images.cases import Case, draw_case
 from afm_scan_bench.images.score import Places, Score, commanded, scaled, score, true_places
 from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
 from afm_scan_ros.api.images import ACCURACY, identified_from
-from afm_scan_ros.core.imaging.grating.registered_image import RegisteredImage, register_image
+from afm_scan_ros.core.imaging.grating.registered_image import (
+    RegisteredImage,
+    accurate_ones,
+    register_image,
+)
 
 VARIANTS: Mapping[str, tuple[int, ...]] = {
     "one pair at 1 Hz": (0,),
     "and one at 10 to 30 Hz": (0, 1),
     "half the size, and 10 to 30 Hz": (0, 2, 1),
+    "three quarters and half the size, and 10 to 30 Hz": (0, 3, 2, 1),
 }
 """Which of a case's images are given; each is a pair of trace and retrace."""
 
@@ -61,14 +66,13 @@ class Outcome:
 def outcomes(seed: int) -> Iterator[Outcome]:
     """Draw a scanner, take its images, and try each choice of them."""
     case = draw_case(seed)
-    frames = case.frame, case.faster(fast_rate(case)), case.half()
+    frames = case.frame, case.faster(fast_rate(case)), case.smaller(0.5), case.smaller(0.75)
     images = list(case.images(frames))
     plain, linear = _plain(case, images[0]), _linear(case, images[0])
     seen = [_seen(case, *each) for each in zip(images, frames, strict=True)]
     for variant, chosen in VARIANTS.items():
         given = [seen[k] for k in chosen]
-        found, seconds, refusal = _found(case, given)
-        refused = " ".join(each.refusal for each in given if each.refusal)
+        found, seconds, refusal, not_used = _found(case, given)
         first = given[0].seen
         yield Outcome(
             seed,
@@ -83,7 +87,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             seconds,
             np.nan if first is None else _left_out(first),
             refusal,
-            "" if refusal else refused,
+            not_used,
         )
 
 
@@ -117,26 +121,26 @@ def _seen(case: Case, taken: Acquired, frame: Frame) -> _Registered:
     return _Registered(taken, frame, found, refusal, time.process_time() - begun)
 
 
-def _found(case: Case, given: Sequence[_Registered]) -> tuple[Values, float, str]:
-    """Figures by what the images teach, seconds a pair, and the refusal."""
+def _found(case: Case, given: Sequence[_Registered]) -> tuple[Values, float, str, str]:
+    """Figures by what the images teach, seconds a pair, the refusal, or why some are not used."""
     x, y = case.scanner.nominal
-    used = [each for each in given if each.seen is not None]
-    seen = [each.seen for each in given if each.seen is not None]
+    seen, inaccurate = accurate_ones([each.seen for each in given if each.seen], ACCURACY)
+    reasons = [each.refusal for each in given if each.refusal] + [str(e) for e in inaccurate]
     begun = time.process_time()
     if not seen:
-        return NOTHING, np.nan, " ".join(each.refusal for each in given)
+        return NOTHING, np.nan, " ".join(reasons), ""
     try:
-        found = identified_from(seen, (1.0 / x, 1.0 / y), ACCURACY, lambda _: None)
+        found = identified_from(seen, (1.0 / x, 1.0 / y), lambda _: None)
     except (afm.InputError, afm.ScanError) as error:
-        return NOTHING, np.nan, str(error)
+        return NOTHING, np.nan, str(error), ""
     seconds = time.process_time() - begun + sum(each.seconds for each in given)
     placed = found.positions[0]
     sides = (side for side in (placed.trace, placed.retrace) if side is not None)
     places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
-    first = used[0]
+    first = next(each for each in given if each.seen is seen[0])
     pitch = score(places, true_places(first.taken), case.grating.pitch, first.frame, placed.known)
     values = {**_percent(pitch), **_of_scans(case, found.model.invert)}
-    return values, seconds / len(given), ""
+    return values, seconds / len(given), "", " ".join(reasons)
 
 
 def _plain(case: Case, taken: Acquired) -> Values:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
@@ -73,14 +74,32 @@ def test_a_loop_longer_than_a_pitch_is_found() -> None:
     assert apart == pytest.approx(0.15 * RANGE, rel=0.02)
 
 
-def test_a_ripple_is_followed() -> None:
-    """Nine ripples of a fifth of a cell, in which no smooth motion settles."""
-    sides = motion(0.1, 0.0, 1.0)
-    place = (2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0
-    for side in sides:
-        side[..., 0] += 0.2 * PITCH * np.sin(9.0 * np.pi * place)
-    found = positions_of(register(image_of(sides, 0.05, 1e-9, 6), PITCH), 2)
-    assert np.sqrt(np.mean(errors(found, sides) ** 2)) < 0.1
+def ringing(periods: float, damping: float) -> tuple[Array, Array]:
+    """True positions, as in ``motion``, of a resonator that follows a triangle once it repeats.
+
+    It rings ``periods`` times in a line one way.
+    """
+    fine = 32
+    count = 2 * SIZE * fine
+    time = 2.0 * np.arange(4 * count) / count
+    triangle = 0.5 * RANGE * signal.sawtooth(np.pi * time, 0.5)
+    omega = 2.0 * np.pi * periods
+    system = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
+    moved = signal.lsim(system, triangle, time)[1][-count:]
+    there, back = moved.reshape(2, SIZE, fine).mean(axis=2)
+    y = 0.5 * RANGE * ((2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0)
+    trace, retrace = (np.stack(np.meshgrid(x, y), axis=2) for x in (there, back[::-1]))
+    return trace, retrace
+
+
+@pytest.mark.parametrize("periods", [9.3, 25.4])
+def test_a_ripple_is_followed(periods: float) -> None:
+    """Ripples of a quarter and a tenth of a cell, in which no smooth motion settles."""
+    sides = ringing(periods, 0.02)
+    found = register(image_of(sides, 0.05, 1e-9, 6), PITCH)
+    assert found.form.ripple is not None
+    assert found.form.ripple.periods == pytest.approx(periods, rel=0.02)
+    assert np.sqrt(np.mean(errors(positions_of(found, 2), sides) ** 2)) < 0.1
 
 
 def test_a_tilted_sample_moves_nothing() -> None:
@@ -164,11 +183,17 @@ def test_the_model_follows_the_loop() -> None:
     sides = motion(0.2, 0.0, 0.9)
     image = image_of(sides, 0.05, 1e-9, 2)
     model = model_of([image], [positions_of(register(image, PITCH), 2)], (1e6, 1e6), lambda _: None)
-    surface = model.axis("x").hysteresis.surface
-    gain = surface.chord * model.axis("x").vibration.static_gain
-    assert gain * 1e6 == pytest.approx(0.9, rel=0.01)
-    widest = surface.values[-1, 0] - 2.0 * surface.values[len(surface.values) // 2, 0]
-    assert 2.0 * widest / (surface.output_upper - surface.output_lower) > 0.05
+    axis = model.axis("x")
+    most = 0.5 * RANGE * 1e6 * (1.0 - 1.0 / SIZE)
+    way = most * np.linspace(-1.0, 1.0, 2 * SIZE + 1)
+    operator = axis.hysteresis.operator()
+    state = operator.at_rest()
+    for _ in range(2):
+        state, there = operator.apply(state, way)
+        state, back = operator.apply(state, way[::-1])
+    reach = np.ptp(there) * axis.vibration.static_gain
+    assert reach == pytest.approx(0.9 * 2.0 * most * 1e-6, rel=0.01)
+    assert (back[SIZE] - there[SIZE]) / np.ptp(there) == pytest.approx(0.1, rel=0.05)
 
 
 def test_a_grid_shows_what_lies_there() -> None:

@@ -5,6 +5,13 @@ import pytest
 from attrs import evolve
 
 import afm_scan_ros as afm
+from afm_scan_ros.core.imaging.grating import registered_image
+from afm_scan_ros.core.imaging.grating.models import Positions
+from afm_scan_ros.core.imaging.grating.registered_image import (
+    ImageQuantity,
+    RegisteredImage,
+    accurate_ones,
+)
 from afm_scan_ros.report.grating import grating_table
 
 PITCH = 6e-6
@@ -42,3 +49,28 @@ def test_the_first_error_is_raised_where_all_are_refused() -> None:
     other = evolve(noise, name="other.npz")
     with pytest.raises(afm.InputError, match=r"^noise.npz: "):
         afm.identify_from_images([noise, other], PITCH)
+
+
+def known_to(x: float, y: float, size: float) -> RegisteredImage:
+    """Return a registered image whose pitch is known to x and y (% rms)."""
+    image = evolve(without_cells(), range_x=size, range_y=size, name=f"{x} {y} {size}")
+    figures = [
+        ImageQuantity(registered_image.PITCH, axis, "% rms", each, each, each)
+        for axis, each in (("x", x), ("y", y))
+    ]
+    return RegisteredImage(image, Positions(np.empty(0), None, np.empty(0)), tuple(figures))
+
+
+def test_an_image_that_is_not_accurate_is_refused() -> None:
+    """Y counts in the largest images, of which one at least is used, and x in all."""
+    large, small = 40e-6, 20e-6
+    exact, faint = known_to(0.1, 0.2, large), known_to(0.1, 0.5, large)
+    smaller, astray = known_to(0.3, 0.9, small), known_to(0.4, 0.1, small)
+    used, errors = accurate_ones([smaller, astray, exact, faint], 0.0035)
+    assert used == [smaller, exact]
+    assert [str(error).split(":")[0] for error in errors] == ["0.1 0.5 4e-05", "0.4 0.1 2e-05"]
+    assert "known to 0.5 % rms over the image (95 %), and 0.35 % is asked" in str(errors[0])
+    used, errors = accurate_ones([smaller, faint], 0.0035)
+    assert used == []
+    assert len(errors) == 2
+    assert accurate_ones([faint, smaller], 0.0095) == ([faint, smaller], [])

@@ -195,8 +195,8 @@ class MotionEquations:
 def _gram(form: MotionForm, direction: int, weight: Array) -> Array:
     """Sum of weight times the products of two factors over an image: (count, count)."""
     pixels, lines = middles(form.pixels), middles(form.lines)
-    fast, slow = form.along(pixels), form.across(lines)
-    here = slice(direction * form.fast, (direction + 1) * form.fast)
+    fast, slow = form.along(direction, pixels), form.across(lines)
+    here = form.part(direction)
     there = slice(2 * form.fast, -1)
     result = np.zeros((form.count, form.count))
     result[here, here] = fast.T @ (weight.sum(axis=0)[:, np.newaxis] * fast)
@@ -219,9 +219,9 @@ def _moments(form: MotionForm, direction: int, group: Indices, weight: Array) ->
 
     pixels, lines = middles(form.pixels), middles(form.lines)
     line, pixel = np.arange(form.lines)[:, np.newaxis], np.arange(form.pixels)
-    here = slice(direction * form.fast, (direction + 1) * form.fast)
+    here = form.part(direction)
     result = np.zeros((GROUPS, form.count))
-    result[:, here] = sums(pixel, weight, form.pixels) @ form.along(pixels)
+    result[:, here] = sums(pixel, weight, form.pixels) @ form.along(direction, pixels)
     result[:, 2 * form.fast : -1] = sums(line, weight, form.lines) @ form.across(lines)
     result[:, -1] = sums(line, weight * pixels, form.lines) @ lines
     return result

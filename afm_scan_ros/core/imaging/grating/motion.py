@@ -4,8 +4,12 @@
 
 ``f`` is another function for trace and retrace, ``g`` is common to both. A line repeats the motion
 of the one before it, so what changes from line to line is the slow axis, creep, drift and what
-one axis adds to the other. Functions are cubic splines; the coefficients enter linearly.
+one axis adds to the other. Functions are cubic splines; the coefficients enter linearly. A fast
+line rings after each turn: f then has a damped oscillation as well, whose amplitude, phase and
+their change are coefficients of each direction.
 """
+
+from typing import ClassVar
 
 import numpy as np
 from attrs import frozen
@@ -35,21 +39,49 @@ def middles(count: int) -> Array:
 
 
 @frozen
+class Ripple:
+    """A damped oscillation after each turn: its ``periods`` in a line one way, and ``damping``."""
+
+    COLUMNS: ClassVar[int] = 4
+
+    periods: float
+    damping: float
+
+    @property
+    def pole(self) -> complex:
+        """Pole, in units of the time of a line one way."""
+        return complex(2.0 * np.pi * self.periods * (1j - self.damping))
+
+    def columns(self, passed: Array) -> Array:
+        """Oscillation and its change with pole, at times from 0 to 1 over a line (n,): (n, 4)."""
+        decay = np.exp(self.pole * passed)
+        return np.stack([decay.real, decay.imag, passed * decay.real, passed * decay.imag], axis=1)
+
+
+@frozen
 class MotionForm:
     """Numbers of an image's motion: its ``lines``, ``pixels``, and the intervals of the splines.
 
-    ``pixel_intervals`` are those of f, ``line_intervals`` those of g.
+    ``pixel_intervals`` are those of f, ``line_intervals`` those of g. A line goes on by
+    ``overscan`` of its length at either end before it turns. f has a ``ripple`` or none.
     """
 
     lines: int
     pixels: int
     pixel_intervals: int
     line_intervals: int
+    overscan: float = 0.0
+    ripple: Ripple | None = None
+
+    @property
+    def splines(self) -> int:
+        """Splines of f in one direction: its first coefficients."""
+        return self.pixel_intervals + CUBIC
 
     @property
     def fast(self) -> int:
         """Coefficients of f in one direction."""
-        return self.pixel_intervals + CUBIC
+        return self.splines + (0 if self.ripple is None else Ripple.COLUMNS)
 
     @property
     def slow(self) -> int:
@@ -61,22 +93,33 @@ class MotionForm:
         """Coefficients of one coordinate: f of the trace, f of the retrace, g and b."""
         return 2 * self.fast + self.slow + 1
 
-    def along(self, pixels: Array) -> Array:
-        """Values of f's splines at pixels (n,), from -1 to 1: (n, fast)."""
-        return spline_basis(pixels, self.pixel_intervals)
+    def along(self, direction: int, pixels: Array) -> Array:
+        """Factors of f's coefficients at pixels (n,), from -1 to 1: (n, fast).
+
+        ``direction`` is 0 for the trace, which runs to higher pixels, 1 for the retrace.
+        """
+        smooth = spline_basis(pixels, self.pixel_intervals)
+        if self.ripple is None:
+            return smooth
+        passed = 0.5 * (1.0 - pixels if direction else 1.0 + pixels)
+        return np.hstack([smooth, self.ripple.columns(passed)])
+
+    def part(self, direction: int) -> slice:
+        """Coefficients of f in a direction."""
+        return slice(direction * self.fast, (direction + 1) * self.fast)
+
+    def smooth_part(self, direction: int) -> slice:
+        """Coefficients of f's splines in a direction."""
+        return slice(direction * self.fast, direction * self.fast + self.splines)
 
     def across(self, lines: Array) -> Array:
         """Values of g's splines at lines (n,), from -1 to 1: (n, slow)."""
         return spline_basis(lines, self.line_intervals)[:, :-1]
 
     def rows(self, direction: int, lines: Array, pixels: Array) -> Array:
-        """Factors of the coefficients at places (n,) from -1 to 1: (n, count).
-
-        ``direction`` is 0 for the trace, 1 for the retrace.
-        """
+        """Factors of the coefficients at places (n,) from -1 to 1: (n, count)."""
         result = np.zeros((len(lines), self.count))
-        first = direction * self.fast
-        result[:, first : first + self.fast] = self.along(pixels)
+        result[:, self.part(direction)] = self.along(direction, pixels)
         result[:, 2 * self.fast : -1] = self.across(lines)
         result[:, -1] = lines * pixels
         return result
@@ -87,32 +130,30 @@ class MotionForm:
         ``coefficients`` are (count,) or (count, many).
         """
         pixels, lines = middles(self.pixels), middles(self.lines)
-        first = direction * self.fast
-        fast = self.along(pixels) @ coefficients[first : first + self.fast]
+        fast = self.along(direction, pixels) @ coefficients[self.part(direction)]
         slow = self.across(lines) @ coefficients[2 * self.fast : -1]
         both = np.multiply.outer(np.multiply.outer(lines, pixels), coefficients[-1])
         return np.asarray(fast[np.newaxis] + slow[:, np.newaxis] + both)
 
-    def gaps_at_turns(self, coefficients: Array, overscan: float) -> Array:
-        """Trace less retrace at the turns before and behind the line: (2, many).
+    def turns(self) -> Array:
+        """Factors of trace less retrace at the turns before and behind the line: (2, count).
 
-        A parabola is fitted to the half of the line next to a turn. It is extrapolated through the
-        ``overscan``.
+        A parabola is fitted to the half of the line next to a turn, without ripple. It is
+        extrapolated through the overscan.
         """
-        found = []
-        for end in (-1.0, 1.0):
+        result = np.zeros((2, self.count))
+        for end, row in zip((-1.0, 1.0), result, strict=True):
             pixels = end * np.linspace(0.5, 1.0, AT_TURN)
-            sides = (slice(0, self.fast), slice(self.fast, 2 * self.fast))
-            trace, retrace = (self.along(pixels) @ coefficients[side] for side in sides)
-            parabola = np.polynomial.polynomial.polyfit(pixels, trace - retrace, 2)
-            turn = end * (1.0 + 2.0 * overscan)
-            found.append(np.polynomial.polynomial.polyval(turn, parabola))
-        return np.array(found)
+            parabolas = np.linalg.pinv(np.vander(pixels, 3))
+            at_turn = np.vander([end * (1.0 + 2.0 * self.overscan)], 3)[0] @ parabolas
+            apart = at_turn @ spline_basis(pixels, self.pixel_intervals)
+            row[self.smooth_part(0)], row[self.smooth_part(1)] = apart, -apart
+        return result
 
     def with_retrace_shifted(self, coefficients: Array, distance: Array) -> Array:
         """Coefficients (count, many) whose retrace is shifted by a distance (many,)."""
         moved = coefficients.copy()
-        moved[self.fast : 2 * self.fast] += distance
+        moved[self.smooth_part(1)] += distance
         return moved
 
     def coarse(self, direction: int) -> Array:
@@ -137,11 +178,11 @@ class MotionForm:
         return np.asarray(between(middles(self.lines), middles(self.pixels)))
 
     def roughness(self) -> tuple[Array, Array]:
-        """Third differences of f, and of g, along their coefficients: (rows, count) each."""
+        """Third differences of f's splines, and of g's: (rows, count) each."""
         count = self.count
-        trace, retrace = np.zeros((2, self.fast - CUBIC, count))
-        steps = np.diff(np.eye(self.fast), CUBIC, axis=0)
-        trace[:, : self.fast] = retrace[:, self.fast : 2 * self.fast] = steps
+        trace, retrace = np.zeros((2, self.splines - CUBIC, count))
+        steps = np.diff(np.eye(self.splines), CUBIC, axis=0)
+        trace[:, self.smooth_part(0)] = retrace[:, self.smooth_part(1)] = steps
         slow = np.zeros((self.slow + 1 - CUBIC, count))
         slow[:, 2 * self.fast : -1] = np.diff(np.eye(self.slow + 1), CUBIC, axis=0)[:, :-1]
         return np.vstack([trace, retrace]), slow

@@ -64,6 +64,31 @@ def register_image(image: ScanImage, pitch: float) -> RegisteredImage:
     return RegisteredImage(image, positions, figures_of(image, found, positions.known))
 
 
+def accurate_ones(
+    seen: Sequence[RegisteredImage], accuracy: float
+) -> tuple[list[RegisteredImage], list[InputError]]:
+    """Return images that show the pitch to an accuracy (1), and errors of the others.
+
+    y counts in the largest images, which show its gain, x in all.
+    """
+    used: list[RegisteredImage] = []
+    errors = []
+    for each in sorted(seen, key=lambda one: -one.image.range_y):
+        axes = "x" if used and each.image.range_y < used[0].image.range_y else "xy"
+        worst = max(f.value for f in each.figures if f.name == PITCH and f.axis in axes)
+        if worst <= PERCENT * accuracy:
+            used.append(each)
+            continue
+        errors.append(
+            InputError(
+                f"{each.image.name}: the distance of a pitch is known to {worst:.2g} % rms over the"
+                f" image (95 %), and {PERCENT * accuracy:.2g} % is asked: record an image that"
+                " shows more cells, with more pixels or less noise, or allow a lower accuracy"
+            )
+        )
+    return [each for each in seen if each in used], errors
+
+
 def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...]:
     """Scale and angle of y without drift, and drift of x and y; none where a direction is missing.
 
@@ -236,9 +261,10 @@ def _motion(
 ) -> _Motion:
     """Return the motion of coefficients (n, count, 2), x along the mean line."""
     form = registration.form
-    pixels, lines = form.along(middles(form.pixels)), form.across(middles(form.lines)[known])
+    lines = form.across(middles(form.lines)[known])
     trace, retrace = (
-        pixels @ coefficients[:, first : first + form.fast] for first in (0, form.fast)
+        form.along(direction, middles(form.pixels)) @ coefficients[:, form.part(direction)]
+        for direction in (0, 1)
     )
     rows = lines @ coefficients[:, 2 * form.fast : -1]
     along = (trace[:, -1] - trace[:, 0] + retrace[:, -1] - retrace[:, 0])[..., np.newaxis]

@@ -26,7 +26,7 @@ from afm_scan_ros.core.imaging.grating.equations import (
 )
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm
-from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, columns_moved, first_motion
+from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, first_motion, with_ripple
 from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell, mean_cell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
@@ -45,16 +45,8 @@ STEEPEST = 0.9
 """Quantile of the slope from which on a height shows where an edge lies."""
 OF_CELL = 3
 """Intervals of f in each cell, as lines cross different parts of it. Those of g are one a cell."""
-RIPPLES = 20
-"""Periods of a ripple over a line, one way, that f can follow."""
-OF_RIPPLE = 4
-"""Intervals of f in a period of a ripple."""
-PIXELS_OF_INTERVAL = 3
-"""Fewest pixels of an interval of f."""
 COLUMNS = 3
 """Turns in which the columns are moved one by one, before all coefficients are."""
-COMPARED = 12
-"""Turns after which a motion with ripple is compared with a smooth one."""
 
 
 BEGINNING = Smoothing()
@@ -98,34 +90,31 @@ def register(image: ScanImage, pitch: float) -> Registration:
     """
     recorded = [each for each in (image.trace, image.retrace) if each is not None]
     given = [levelled(each) for each in recorded]
-    rough, coefficients, share = first_motion(image, given, pitch)
-    first = rough.image(0, coefficients)
-    cells_across = [np.hypot(*np.ptp(first, axis=axis).mean(axis=0)) for axis in (0, 1)]
+    first, coefficients, share = first_motion(image, given, pitch)
+    places = first.image(0, coefficients)
+    cells_across = [np.hypot(*np.ptp(places, axis=axis).mean(axis=0)) for axis in (0, 1)]
     form = evolve(
-        rough,
+        first,
         pixel_intervals=round(OF_CELL * cells_across[1]),
         line_intervals=round(cells_across[0]),
     )
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
-    finest = image.pixels // PIXELS_OF_INTERVAL
-    finer = evolve(form, pixel_intervals=min(finest, RIPPLES * OF_RIPPLE))
-    smooth, rippling = (
-        _State.begin(
-            each,
-            carried_over(rough, coefficients, each, len(given)),
-            recorded,
-            given,
-            size,
-            0 if image.upward else -1,
-        )
-        for each in (form, finer)
+    rough = _State.begin(
+        form,
+        carried_over(first, coefficients, form, len(given)),
+        recorded,
+        given,
+        size,
+        0 if image.upward else -1,
     )
-    state, rippling = _judged(smooth), rippling.by_columns()
+    ringing = rough.by_columns()
+    smooth = min(rough, ringing.without_ripple(), key=_State.mean_miss)
+    state, rippling = _judged(smooth), _judged(ringing)
     if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
-        state = _judged(rippling)
+        state = rippling
     state = _settled(state, image.name)
     if len(given) == 2:  # noqa: PLR2004 - trace and retrace
-        state = state.with_turns_closed(image.overscan)
+        state = state.with_turns_closed()
     return state.registration(share * pitch)
 
 
@@ -188,15 +177,25 @@ class _State:
         return cls(form, coefficients, recorded, heights, even, even, size, cell)
 
     def by_columns(self) -> "_State":
-        """Return the state after each column has moved to where it fits best, and some turns."""
+        """Return the state whose columns have moved to where they fit best, with a ripple."""
         state = self
         for _ in range(COLUMNS):
-            moved = columns_moved(self.form, state.coefficients, self.heights, state.cell)
-            cell = _mean_cell(self.form, moved, self.heights, self.weights, self.size)
-            state = evolve(state, coefficients=moved, cell=cell)
-        for _ in range(COMPARED):
-            state = state.turned(judging=True)
+            form, moved = with_ripple(state.form, state.coefficients, self.heights, state.cell)
+            cell = _mean_cell(form, moved, self.heights, self.weights, self.size)
+            state = evolve(state, form=form, coefficients=moved, cell=cell)
         return state
+
+    def without_ripple(self) -> "_State":
+        """Return the state without its ripple."""
+        form = evolve(self.form, ripple=None)
+        kept = [self.coefficients[self.form.smooth_part(direction)] for direction in range(2)]
+        moved = np.vstack([*kept, self.coefficients[2 * self.form.fast :]])
+        cell = _mean_cell(form, moved, self.heights, self.weights, self.size)
+        return evolve(self, form=form, coefficients=moved, cell=cell)
+
+    def mean_miss(self) -> float:
+        """Mean magnitude by which the mean cell misses the heights."""
+        return float(np.mean([np.abs(self.missed(d).residual) for d in range(len(self.heights))]))
 
     def explains_more(self, plainer: "_State") -> bool:
         """Whether more numbers explain more than they cost, by Schwarz's criterion.
@@ -268,13 +267,13 @@ class _State:
         )
         return float(np.sqrt(np.mean(moved**2) / np.mean(deviation)))
 
-    def with_turns_closed(self, overscan: float) -> "_State":
+    def with_turns_closed(self) -> "_State":
         """Return the state whose retrace is shifted by whole cells to meet the trace at the turns.
 
         A shift by whole cells changes no height. Raises InputError where the two turns need
         different shifts.
         """
-        gaps = self.form.gaps_at_turns(self.coefficients, overscan)
+        gaps = self.form.turns() @ self.coefficients
         whole = np.rint(gaps)
         if np.any(whole[0] != whole[1]):
             raise InputError(
