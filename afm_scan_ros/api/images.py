@@ -147,8 +147,6 @@ def identified_from(
 
 def _corrected_or_none(seen: RegisteredImage) -> ScanImage | None:
     found = seen.positions
-    if found.retrace is None:
-        return None
     try:
         return _corrected(seen.image, found.trace, found.retrace, found.known)
     except InputError:

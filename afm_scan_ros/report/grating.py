@@ -122,10 +122,9 @@ def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]
                 (each.trace, BLUE, 2.0, "trace"),
                 (each.retrace, ORANGE, 0.8, "retrace"),
             ):
-                if place is not None:
-                    number = AXES.index(axis)
-                    moved = place[..., number].mean(axis=number) - commanded
-                    panel.plot(MICRO * commanded, MICRO * moved, color=colour, lw=width, label=side)
+                number = AXES.index(axis)
+                moved = place[..., number].mean(axis=number) - commanded
+                panel.plot(MICRO * commanded, MICRO * moved, color=colour, lw=width, label=side)
             zero_line(panel)
             panel.set(
                 xlabel=f"commanded {axis} in µm", ylabel=f"actual minus commanded {axis} in µm"

@@ -196,6 +196,14 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
         lambda _: afm.ScanImage(SQUARE, SQUARE, range_x="10um", range_y=1e-5),  # type: ignore[arg-type] # as above
         "image: range_x = '10um': give a number above 0, in m",
     ),
+    "a range as a truth": (
+        lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=True, range_y=1e-5),
+        "image: range_x = True: give a number above 0, in m",
+    ),
+    "heights in words": (
+        lambda _: afm.ScanImage("x", SQUARE, range_x=1e-5, range_y=1e-5),  # type: ignore[arg-type] # as above
+        "trace and retrace: give heights as numbers",
+    ),
     "no time for a line": (
         lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5, line_time=-1.0),
         "image: line_time = -1.0: give a number above 0, in s",

@@ -4,6 +4,7 @@ from numbers import Real
 
 import numpy as np
 from attrs import field, frozen
+from attrs.converters import optional
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -13,7 +14,14 @@ SMALLEST = 8
 
 
 def _floats(values: Array) -> Array:
-    return np.asarray(values, dtype=float)
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("trace and retrace: give heights as numbers, (lines, pixels)") from None
+
+
+def _real(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 @frozen(eq=False)
@@ -30,7 +38,7 @@ class ScanImage:
     """
 
     trace: Array = field(converter=_floats)
-    retrace: Array | None
+    retrace: Array | None = field(converter=optional(_floats))
     range_x: float
     range_y: float
     line_time: float | None = None
@@ -46,7 +54,7 @@ class ScanImage:
         self._refuse_unpositive("range_y", "m")
         if self.line_time is not None:
             self._refuse_unpositive("line_time", "s")
-        if not (isinstance(self.overscan, Real) and 0.0 <= float(self.overscan) < 1.0):
+        if not (_real(self.overscan) and 0.0 <= float(self.overscan) < 1.0):
             raise InputError(
                 f"{self.name}: overscan = {self.overscan!r}: give a share of range_x, from 0 to"
                 " below 1"
@@ -71,7 +79,7 @@ class ScanImage:
 
     def _refuse_unpositive(self, name: str, unit: str) -> None:
         value = getattr(self, name)
-        if not (isinstance(value, Real) and float(value) > 0.0):
+        if not (_real(value) and 0.0 < float(value) < np.inf):
             raise InputError(f"{self.name}: {name} = {value!r}: give a number above 0, in {unit}")
 
     @property

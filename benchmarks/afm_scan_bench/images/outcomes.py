@@ -135,8 +135,7 @@ def _found(case: Case, given: Sequence[_Registered]) -> tuple[Values, float, str
         return NOTHING, np.nan, str(error), ""
     seconds = time.process_time() - begun + sum(each.seconds for each in given)
     placed = found.positions[0]
-    sides = (side for side in (placed.trace, placed.retrace) if side is not None)
-    places = Places(*(np.moveaxis(side, -1, 0) for side in sides))
+    places = Places(*(np.moveaxis(side, -1, 0) for side in (placed.trace, placed.retrace)))
     first = next(each for each in given if each.seen is seen[0])
     pitch = score(places, true_places(first.taken), case.grating.pitch, first.frame, placed.known)
     values = {**_percent(pitch), **_of_scans(case, found.model.invert)}

@@ -58,7 +58,7 @@ def known_to(x: float, y: float, size: float) -> RegisteredImage:
         ImageQuantity(registered_image.PITCH, axis, "% rms", each, each, each)
         for axis, each in (("x", x), ("y", y))
     ]
-    return RegisteredImage(image, Positions(np.empty(0), None, np.empty(0)), tuple(figures))
+    return RegisteredImage(image, Positions(*np.empty((3, 0))), tuple(figures))
 
 
 def test_an_image_that_is_not_accurate_is_refused() -> None:

@@ -174,7 +174,8 @@ def _autocorrelation(heights: Array) -> Array:
     part = whole[rows // 2 : rows + rows // 2 + 1, columns // 2 : columns + columns // 2 + 1]
     shifts = [np.abs(np.arange(-(n // 2), n - n // 2 + 1)[: n + 1]) for n in (rows, columns)]
     overlap = np.outer(rows - shifts[0], columns - shifts[1])[: part.shape[0], : part.shape[1]]
-    return np.asarray(part / overlap / centred.var())
+    spread = max(float(centred.var()), np.finfo(float).tiny)  # a flat image has none
+    return np.asarray(part / overlap / spread)
 
 
 def cells_of(heights: Sequence[Array], vectors: Array) -> list[Cells]:

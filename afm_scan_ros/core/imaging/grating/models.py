@@ -55,14 +55,14 @@ LEVELS = 3
 class Positions:
     """Where the tip was over the grating at each pixel, m, zero on average: (lines, pixels, 2).
 
-    x runs along the mean direction of the lines, y at a right angle to it. ``retrace`` is None
-    where there is none. ``uncertainty`` (lines, pixels), m, is the trace's standard deviation. It
-    is infinite in the line scanned first, which begins at rest and moves otherwise, and in those
-    before the first edges that show y: y turned just before, so no later motion tells theirs.
+    x runs along the mean direction of the lines, y at a right angle to it. ``uncertainty`` (lines,
+    pixels), m, is the trace's standard deviation. It is infinite in the line scanned first, which
+    begins at rest and moves otherwise, and in those before the first edges that show y: y turned
+    just before, so no later motion tells theirs.
     """
 
     trace: Array
-    retrace: Array | None
+    retrace: Array
     uncertainty: Array
 
     @property
@@ -72,9 +72,9 @@ class Positions:
         return slice(int(lines[0]), int(lines[-1]) + 1)
 
 
-def positions_of(registration: Registration, directions: int, *, upward: bool = True) -> Positions:
-    """Turn the motion in cells of one direction or both into x and y in m."""
-    cells = [registration.image(direction) for direction in range(directions)]
+def positions_of(registration: Registration, *, upward: bool = True) -> Positions:
+    """Turn the motion in cells into x and y in m."""
+    cells = [registration.image(direction) for direction in range(2)]
     along = np.sum([each[:, -1] - each[:, 0] for each in cells], axis=0).mean(axis=0)
     cosine, sine = along / np.hypot(*along)
     turn = registration.pitch * np.array([[cosine, -sine], [sine, cosine]])
@@ -83,7 +83,7 @@ def positions_of(registration: Registration, directions: int, *, upward: bool = 
     uncertainty = registration.pitch * registration.uncertainty(0)
     shown = np.einsum("lij,i,j->l", registration.shown, turn[:, 1], turn[:, 1])
     uncertainty[_before_edges(shown, upward=upward)] = np.inf
-    return Positions(found[0], found[1] if directions > 1 else None, uncertainty)
+    return Positions(found[0], found[1], uncertainty)
 
 
 def _before_edges(shown: Array, *, upward: bool) -> slice:
@@ -102,8 +102,8 @@ def model_of(
     """Identify x from the positions in all images, and y from those in the largest ones.
 
     Drives are ``volts_per_metre`` (V/m) times the commanded positions, zero in the image's middle.
-    Raises InputError without a retrace, which shows the hysteresis, or where the time of a line is
-    not known; ScanError where the fit does not converge.
+    Raises InputError where the time of a line is not known; ScanError where the fit does not
+    converge.
     """
     records = [
         _record(image, each, volts_per_metre[0])
@@ -120,10 +120,10 @@ def model_of(
 
 def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
     """Return the mean to-and-fro line of an image, several times."""
-    if positions.retrace is None or image.line_time is None:
+    if image.line_time is None:
         raise InputError(
-            f"{image.name}: a model needs trace, retrace and the time of a line: give an image"
-            " that holds them, or the time"
+            f"{image.name}: a model needs the time of a line: give an image that holds it, or the"
+            " time"
         )
     line = LineDrive.of(image, scale, image.line_time)
     there, back = (each[..., 0].mean(axis=0) for each in (positions.trace, positions.retrace))

@@ -5,8 +5,8 @@
 ``f`` is another function for trace and retrace, ``g`` is common to both. A line repeats the motion
 of the one before it, so what changes from line to line is the slow axis, creep, drift and what
 one axis adds to the other. Functions are cubic splines; the coefficients enter linearly. A fast
-line rings after each turn: f then has a damped oscillation as well, whose amplitude, phase and
-their change are coefficients of each direction.
+line rings after each turn: f then has a damped oscillation as well. Its amplitude and phase, and
+how they change along the line, are coefficients of each direction.
 """
 
 from typing import ClassVar
@@ -53,7 +53,10 @@ class Ripple:
         return complex(2.0 * np.pi * self.periods * (1j - self.damping))
 
     def columns(self, passed: Array) -> Array:
-        """Oscillation and its change with pole, at times from 0 to 1 over a line (n,): (n, 4)."""
+        """Oscillation, and times it, at times from 0 to 1 over a line (n,): (n, 4).
+
+        The latter are its change with the pole.
+        """
         decay = np.exp(self.pole * passed)
         return np.stack([decay.real, decay.imag, passed * decay.real, passed * decay.imag], axis=1)
 

@@ -57,10 +57,8 @@ def register_image(image: ScanImage, pitch: float) -> RegisteredImage:
     Raises InputError where there is no retrace or no such grating, ScanError where the turns do not
     settle.
     """
-    if image.retrace is None:
-        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
     found = register(image, pitch)
-    positions = positions_of(found, 2, upward=image.upward)
+    positions = positions_of(found, upward=image.upward)
     return RegisteredImage(image, positions, figures_of(image, found, positions.known))
 
 

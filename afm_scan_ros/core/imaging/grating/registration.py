@@ -83,12 +83,25 @@ class Registration:
 
 
 def register(image: ScanImage, pitch: float) -> Registration:
-    """Register trace and retrace of an image, or its trace alone; ``pitch`` in m.
+    """Register trace and retrace of an image; ``pitch`` in m.
 
-    Raises InputError where no lattice of two directions is found, or trace and retrace do not meet
-    at the turns, and ScanError where the motion does not settle.
+    Raises InputError where there is no retrace, no lattice of two directions is found, or trace and
+    retrace do not meet at the turns, and ScanError where the motion does not settle.
     """
-    recorded = [each for each in (image.trace, image.retrace) if each is not None]
+    rough, spacing = _begun(image, pitch)
+    ringing = rough.by_columns()
+    smooth = min(rough, ringing.without_ripple(), key=_State.mean_miss)
+    state, rippling = _judged(smooth), _judged(ringing)
+    if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
+        state = rippling
+    return _settled(state, image.name).with_turns_closed().registration(spacing)
+
+
+def _begun(image: ScanImage, pitch: float) -> tuple["_State", float]:
+    """Return the state at a rough motion, and the distance of neighbouring cells, m."""
+    if image.retrace is None:
+        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
+    recorded = image.trace, image.retrace
     given = [levelled(each) for each in recorded]
     first, coefficients, share = first_motion(image, given, pitch)
     places = first.image(0, coefficients)
@@ -99,23 +112,9 @@ def register(image: ScanImage, pitch: float) -> Registration:
         line_intervals=round(cells_across[0]),
     )
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
-    rough = _State.begin(
-        form,
-        carried_over(first, coefficients, form, len(given)),
-        recorded,
-        given,
-        size,
-        0 if image.upward else -1,
-    )
-    ringing = rough.by_columns()
-    smooth = min(rough, ringing.without_ripple(), key=_State.mean_miss)
-    state, rippling = _judged(smooth), _judged(ringing)
-    if rippling.explains_more(state):  # a smooth motion does not settle where there is ripple
-        state = rippling
-    state = _settled(state, image.name)
-    if len(given) == 2:  # noqa: PLR2004 - trace and retrace
-        state = state.with_turns_closed()
-    return state.registration(share * pitch)
+    coefficients = carried_over(first, coefficients, form)
+    line = 0 if image.upward else -1
+    return _State.begin(form, coefficients, recorded, given, size, line), share * pitch
 
 
 def _judged(state: "_State") -> "_State":

@@ -65,9 +65,8 @@ def first_motion(
     cells = cells_of(heights, lattice.vectors)
     _refuse_shorter(image, lattice, pitch)
     coefficients = _through(form, cells)
-    if len(cells) == 2:  # noqa: PLR2004 - trace and retrace
-        apart = (form.turns() @ coefficients).mean(axis=0)
-        coefficients = form.with_retrace_shifted(coefficients, np.rint(apart))
+    apart = (form.turns() @ coefficients).mean(axis=0)
+    coefficients = form.with_retrace_shifted(coefficients, np.rint(apart))
     return form, coefficients, lattice.share
 
 
@@ -84,7 +83,7 @@ def _refuse_shorter(image: ScanImage, lattice: Lattice, pitch: float) -> None:
 
 
 def _through(form: MotionForm, cells: Sequence[Cells]) -> Array:
-    """Coefficients (count, 2) that give the cells of one direction or both their numbers."""
+    """Coefficients (count, 2) that give the cells of both directions their numbers."""
     basis = np.vstack([form.rows(d, *_relative(form, c.places)) for d, c in enumerate(cells)])
     known = np.vstack([each.numbers for each in cells]).astype(float)
     return _solved(form, basis, known)
@@ -105,14 +104,12 @@ def _relative(form: MotionForm, places: Array) -> tuple[Array, Array]:
     )
 
 
-def carried_over(
-    rough: MotionForm, coefficients: Array, form: MotionForm, directions: int
-) -> Array:
+def carried_over(rough: MotionForm, coefficients: Array, form: MotionForm) -> Array:
     """Coefficients of a motion in another form."""
     grid = np.meshgrid(middles(33), middles(33), indexing="ij")
     line, pixel = (each.ravel() for each in grid)
-    basis = np.vstack([form.rows(d, line, pixel) for d in range(directions)])
-    known = np.vstack([rough.rows(d, line, pixel) @ coefficients for d in range(directions)])
+    basis = np.vstack([form.rows(d, line, pixel) for d in range(2)])
+    known = np.vstack([rough.rows(d, line, pixel) @ coefficients for d in range(2)])
     return _solved(form, basis, known)
 
 
