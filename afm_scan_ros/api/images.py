@@ -65,8 +65,8 @@ def identify_from_images(
         volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
             drive of 1 V stands for a commanded position of 1 µm.
         progress: is called with what is being done.
-        accuracy: of the distance of a pitch, 1, rms over the image, that each image must reach
-            with 95 % certainty; in y only the largest images must.
+        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach
+            with 95 % certainty. Beside it twice as much is allowed, in y only for images as large.
 
     x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate it
     from a lag or from creep: then all that differs between trace and retrace is taken for

@@ -56,9 +56,9 @@ class Case:
         """Return the case's frame at another line rate (Hz)."""
         return evolve(self.frame, line_time=1.0 / line_rate)
 
-    def smaller(self, share: float) -> Frame:
-        """Return a ``share`` of the case's frame, or four cells of it where that is more."""
-        share = max(share, SMALLEST * self.grating.pitch / self.frame.range_x)
+    def half(self) -> Frame:
+        """Return the case's frame half as large, or of four cells where that is more."""
+        share = max(0.5, SMALLEST * self.grating.pitch / self.frame.range_x)
         range_x, range_y = share * self.frame.range_x, share * self.frame.range_y
         return evolve(self.frame, range_x=range_x, range_y=range_y)
 

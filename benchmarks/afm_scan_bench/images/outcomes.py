@@ -15,6 +15,7 @@ from afm_scan_ros.api.images import ACCURACY, identified_from
 from afm_scan_ros.core.imaging.grating.registered_image import (
     RegisteredImage,
     accurate_ones,
+    pitch_uncertainty,
     register_image,
 )
 
@@ -22,7 +23,6 @@ VARIANTS: Mapping[str, tuple[int, ...]] = {
     "one pair at 1 Hz": (0,),
     "and one at 10 to 30 Hz": (0, 1),
     "half the size, and 10 to 30 Hz": (0, 2, 1),
-    "three quarters and half the size, and 10 to 30 Hz": (0, 3, 2, 1),
 }
 """Which of a case's images are given; each is a pair of trace and retrace."""
 
@@ -43,9 +43,9 @@ class Outcome:
     """Figures of one scanner by the controller's gains, by the true ones, and by what was found.
 
     ``found`` holds NaN for a scan that the model's inverse refuses, and everywhere where there is a
-    ``refusal``. Its pitch is that of the first image used; ``not_used`` says which were not, and
-    why. ``seconds`` are those of the processor for a pair, ``left_out`` is the share of
-    the first image's lines that counts for nothing, as no edge shows y there, %.
+    ``refusal``. Its pitch is that of the first accurate image; ``not_used`` says which images were
+    not used, and why. ``seconds`` are those of the processor for a pair, ``left_out`` is the share
+    of the first image's lines that counts for nothing, as no edge shows y there, %.
     """
 
     seed: int
@@ -66,7 +66,7 @@ class Outcome:
 def outcomes(seed: int) -> Iterator[Outcome]:
     """Draw a scanner, take its images, and try each choice of them."""
     case = draw_case(seed)
-    frames = case.frame, case.faster(fast_rate(case)), case.smaller(0.5), case.smaller(0.75)
+    frames = case.frame, case.faster(fast_rate(case)), case.half()
     images = list(case.images(frames))
     plain, linear = _plain(case, images[0]), _linear(case, images[0])
     seen = [_seen(case, *each) for each in zip(images, frames, strict=True)]
@@ -134,9 +134,10 @@ def _found(case: Case, given: Sequence[_Registered]) -> tuple[Values, float, str
     except (afm.InputError, afm.ScanError) as error:
         return NOTHING, np.nan, str(error), ""
     seconds = time.process_time() - begun + sum(each.seconds for each in given)
-    placed = found.positions[0]
+    accurate = [pitch_uncertainty(each, "xy") <= 100.0 * ACCURACY for each in seen].index(True)
+    placed = found.positions[accurate]
     places = Places(*(np.moveaxis(side, -1, 0) for side in (placed.trace, placed.retrace)))
-    first = next(each for each in given if each.seen is seen[0])
+    first = next(each for each in given if each.seen is seen[accurate])
     pitch = score(places, true_places(first.taken), case.grating.pitch, first.frame, placed.known)
     values = {**_percent(pitch), **_of_scans(case, found.model.invert)}
     return values, seconds / len(given), "", " ".join(reasons)

@@ -62,14 +62,14 @@ def known_to(x: float, y: float, size: float) -> RegisteredImage:
 
 
 def test_an_image_that_is_not_accurate_is_refused() -> None:
-    """Y counts in the largest images, of which one at least is used, and x in all."""
+    """One must be accurate in x and y; beside it half the uncertainty counts, of x if smaller."""
     large, small = 40e-6, 20e-6
-    exact, faint = known_to(0.1, 0.2, large), known_to(0.1, 0.5, large)
-    smaller, astray = known_to(0.3, 0.9, small), known_to(0.4, 0.1, small)
-    used, errors = accurate_ones([smaller, astray, exact, faint], 0.0035)
-    assert used == [smaller, exact]
-    assert [str(error).split(":")[0] for error in errors] == ["0.1 0.5 4e-05", "0.4 0.1 2e-05"]
-    assert "known to 0.5 % rms over the image (95 %), and 0.35 % is asked" in str(errors[0])
+    exact, faint, worse = (known_to(*each, large) for each in ((0.1, 0.2), (0.1, 0.6), (0.1, 0.8)))
+    smaller, astray = known_to(0.6, 0.9, small), known_to(0.8, 0.1, small)
+    used, errors = accurate_ones([smaller, astray, exact, faint, worse], 0.0035)
+    assert used == [smaller, exact, faint]
+    assert [str(error).split(":")[0] for error in errors] == ["0.8 0.1 2e-05", "0.1 0.8 4e-05"]
+    assert "known to 0.8 % rms over the image (95 %), and 0.35 % is asked" in str(errors[0])
     used, errors = accurate_ones([smaller, faint], 0.0035)
     assert used == []
     assert len(errors) == 2

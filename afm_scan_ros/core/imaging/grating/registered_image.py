@@ -24,6 +24,8 @@ DRAWS = 200
 """Draws of the coefficients, of which an interval leaves out five at either end."""
 ENDS = (0.025, 0.975)
 MOST = 0.95
+WIDTH = 2.0
+"""Uncertainty of 95 % certainty over a standard one."""
 PERCENT = 100.0
 NANO = 1e9
 ROUNDING = 1e-12
@@ -67,24 +69,32 @@ def accurate_ones(
 ) -> tuple[list[RegisteredImage], list[InputError]]:
     """Return images that show the pitch to an accuracy (1), and errors of the others.
 
-    y counts in the largest images, which show its gain, x in all.
+    One at least must with 95 % certainty, in x and y. Beside it the standard uncertainty of others
+    counts, half of that; in y only where they are as large, as smaller ones show x alone.
     """
+    asked = PERCENT * accuracy
+    sizes = [each.image.range_y for each in seen if pitch_uncertainty(each, "xy") <= asked]
     used: list[RegisteredImage] = []
     errors = []
-    for each in sorted(seen, key=lambda one: -one.image.range_y):
-        axes = "x" if used and each.image.range_y < used[0].image.range_y else "xy"
-        worst = max(f.value for f in each.figures if f.name == PITCH and f.axis in axes)
-        if worst <= PERCENT * accuracy:
+    for each in seen:
+        axes = "x" if sizes and each.image.range_y < max(sizes) else "xy"
+        known = pitch_uncertainty(each, axes)
+        if known <= (WIDTH if sizes else 1.0) * asked:
             used.append(each)
-            continue
-        errors.append(
-            InputError(
-                f"{each.image.name}: the distance of a pitch is known to {worst:.2g} % rms over the"
-                f" image (95 %), and {PERCENT * accuracy:.2g} % is asked: record an image that"
-                " shows more cells, with more pixels or less noise, or allow a lower accuracy"
+        else:
+            errors.append(
+                InputError(
+                    f"{each.image.name}: the distance of a pitch is known to {known:.2g} % rms over"
+                    f" the image (95 %), and {asked:.2g} % is asked: record an image that shows"
+                    " more cells, with more pixels or less noise, or allow a lower accuracy"
+                )
             )
-        )
-    return [each for each in seen if each in used], errors
+    return used, errors
+
+
+def pitch_uncertainty(seen: RegisteredImage, axes: str) -> float:
+    """Uncertainty of the pitch of the axes, %, with 95 % certainty."""
+    return max(f.value for f in seen.figures if f.name == PITCH and f.axis in axes)
 
 
 def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...]:
@@ -230,12 +240,12 @@ def figures_of(
         for name, axis, unit, rule in RULES
     ]
     for axis, moved in (("x", drawn.trace[..., 0]), ("y", drawn.rows[..., 1])):
-        uncertain = _pitch_uncertainty(moved, registration.pitch)
+        uncertain = _pitch_error(moved, registration.pitch)
         found.append(ImageQuantity(PITCH, axis, "% rms", uncertain, uncertain, uncertain))
     return tuple(found)
 
 
-def _pitch_uncertainty(moved: Array, pitch: float) -> float:
+def _pitch_error(moved: Array, pitch: float) -> float:
     """Rms error of a distance of a pitch, %, that 95 % of draws of a motion (draws, n), m, keep."""
     count = moved.shape[1]
     spacing = abs(float(np.mean(moved[:, -1] - moved[:, 0]))) / (count - 1)
