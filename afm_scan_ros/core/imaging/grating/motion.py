@@ -52,6 +52,15 @@ class Ripple:
         """Pole, in units of the time of a line one way."""
         return complex(2.0 * np.pi * self.periods * (1j - self.damping))
 
+    def behind_a_triangle(self, overscan: float) -> complex:
+        """Amplitude at the beginning of a line of length 1 of a mode that follows a triangle.
+
+        The speed turns round, so the mode rings by twice the speed over its angular frequency. What
+        earlier turns left has the other sign each time.
+        """
+        rings = 1j / (np.pi * self.periods) * np.exp(self.pole * overscan)
+        return complex(rings / (1.0 + np.exp(self.pole * (1.0 + 2.0 * overscan))))
+
     def columns(self, passed: Array) -> Array:
         """Oscillation, and times it, at times from 0 to 1 over a line (n,): (n, 4).
 
@@ -152,6 +161,21 @@ class MotionForm:
             apart = at_turn @ spline_basis(pixels, self.pixel_intervals)
             row[self.smooth_part(0)], row[self.smooth_part(1)] = apart, -apart
         return result
+
+    def ripple_share(self, coefficients: Array) -> complex:
+        """Ripple's amplitude over that of a mode behind a triangle, mean of both directions.
+
+        ``coefficients`` are (count, 2). It is 1 without hysteresis, and 0 without ripple.
+        """
+        if self.ripple is None:
+            return 0.0
+        shares = []
+        for direction, sign in enumerate((1.0, -1.0)):
+            first = self.smooth_part(direction).stop
+            line = np.diff(self.image(direction, coefficients)[:, [0, -1]], axis=1).mean(axis=0)[0]
+            real, imaginary = coefficients[first : first + 2] @ line / (line @ line)
+            shares.append(sign * complex(real, -imaginary))
+        return complex(np.mean(shares)) / self.ripple.behind_a_triangle(self.overscan)
 
     def with_retrace_shifted(self, coefficients: Array, distance: Array) -> Array:
         """Coefficients (count, many) whose retrace is shifted by a distance (many,)."""

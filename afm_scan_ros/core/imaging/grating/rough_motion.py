@@ -246,14 +246,8 @@ class _Ringing:
         return np.asarray(values[3:].reshape(len(self.columns), -1))
 
     def _amplitude(self, ripple: Ripple) -> Array:
-        """Amplitude (2,) after a turn of a triangle that a mode follows, without hysteresis.
-
-        The speed turns round, so the mode rings by twice the speed over its angular frequency. What
-        earlier turns left has the other sign each time.
-        """
-        turn, between = self.overscan, 1.0 + 2.0 * self.overscan
-        rings = 1j / (np.pi * ripple.periods) * np.exp(ripple.pole * turn)
-        rings *= self.distance / (1.0 + np.exp(ripple.pole * between))
+        """Amplitude (2,) of a ripple in the trace, without hysteresis."""
+        rings = self.distance * ripple.behind_a_triangle(self.overscan)
         return np.array([rings.real, -rings.imag])
 
     def _missed(self, values: Array) -> Array:
