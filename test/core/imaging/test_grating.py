@@ -7,6 +7,7 @@ from scipy import signal
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.grating.models import Positions, model_of, positions_of
+from afm_scan_ros.core.imaging.grating.motion import MotionForm, Ripple, middles, spline_basis
 from afm_scan_ros.core.imaging.grating.registration import register
 from afm_scan_ros.core.imaging.regrid import common_rectangle, regridded
 from afm_scan_ros.core.imaging.scan_image import ScanImage
@@ -98,6 +99,38 @@ def test_a_ripple_is_followed(periods: float) -> None:
     assert found.form.ripple is not None
     assert found.form.ripple.periods == pytest.approx(periods, rel=0.02)
     assert np.sqrt(np.mean(errors(positions_of(found), sides) ** 2)) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("share", "rings"), [(1.0, True), (0.6, True), (0.4, False), (1.6, False), (0.8j, False)]
+)
+@pytest.mark.parametrize("overscan", [0.0, 0.08])
+def test_a_ripple_is_that_of_a_mode(share: complex, overscan: float, *, rings: bool) -> None:
+    """Its amplitude and phase are those behind a triangle, as a simulated mode shows them."""
+    ripple = Ripple(9.3, 0.02)
+    form = MotionForm(8, 64, 2, 2, overscan, ripple)
+    coefficients = np.zeros((form.count, 2))
+    for direction, sign in enumerate((1.0, -1.0)):
+        splines = form.smooth_part(direction)
+        coefficients[splines, 0] = np.linspace(-4.0, 4.0, form.splines)
+        line = np.ptp(spline_basis(middles(64), 2) @ coefficients[splines, 0])
+        amplitude = sign * share * line * ripple.behind_a_triangle(overscan)
+        first = splines.stop
+        coefficients[first : first + 2, 0] = amplitude.real, -amplitude.imag
+    assert form.rings_as_a_mode(coefficients) is rings
+    assert not evolve(form, ripple=None).rings_as_a_mode(coefficients)
+
+
+def test_a_mode_behind_a_triangle_rings_as_simulated() -> None:
+    """The formula is of first order in the damping, and leaves out the mean over a pixel."""
+    ripple = Ripple(9.3, 0.02)
+    trace = ringing(ripple.periods, ripple.damping)[0][0, :, 0]
+    place = (2.0 * np.arange(SIZE) + 1.0) / SIZE - 1.0
+    amplitude = RANGE * ripple.behind_a_triangle(0.0)
+    rings = ripple.columns(0.5 * (1.0 + place))[:, :2] @ (amplitude.real, -amplitude.imag)
+    left = trace - rings
+    left -= np.polynomial.Polynomial.fit(place, left, 1)(place)
+    assert np.abs(left).max() < 0.1 * np.abs(rings).max()
 
 
 def test_a_tilted_sample_moves_nothing() -> None:

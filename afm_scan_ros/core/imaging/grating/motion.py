@@ -20,6 +20,8 @@ from afm_scan_ros.core.types import Array
 CUBIC = 3
 AT_TURN = 9
 """Places of the half of a line to which a parabola is fitted."""
+HALF = 0.5
+"""Greatest distance of a ripple's amplitude from that of a mode, over the latter."""
 COARSE = 33
 """Lines and pixels of the grid on which a motion's uncertainty is computed."""
 
@@ -162,20 +164,22 @@ class MotionForm:
             row[self.smooth_part(0)], row[self.smooth_part(1)] = apart, -apart
         return result
 
-    def ripple_share(self, coefficients: Array) -> complex:
-        """Ripple's amplitude over that of a mode behind a triangle, mean of both directions.
+    def rings_as_a_mode(self, coefficients: Array) -> bool:
+        """Whether the ripple's amplitude is that of a mode behind a triangle, within half of it.
 
-        ``coefficients`` are (count, 2). It is 1 without hysteresis, and 0 without ripple.
+        The amplitude is complex, the mean of both directions. Hysteresis slows the motion after a
+        turn, so it is less than that of a mode alone. ``coefficients`` are (count, 2).
         """
         if self.ripple is None:
-            return 0.0
+            return False
         shares = []
         for direction, sign in enumerate((1.0, -1.0)):
             first = self.smooth_part(direction).stop
             line = np.diff(self.image(direction, coefficients)[:, [0, -1]], axis=1).mean(axis=0)[0]
             real, imaginary = coefficients[first : first + 2] @ line / (line @ line)
             shares.append(sign * complex(real, -imaginary))
-        return complex(np.mean(shares)) / self.ripple.behind_a_triangle(self.overscan)
+        share = complex(np.mean(shares)) / self.ripple.behind_a_triangle(self.overscan)
+        return abs(share - 1.0) < HALF
 
     def with_retrace_shifted(self, coefficients: Array, distance: Array) -> Array:
         """Coefficients (count, many) whose retrace is shifted by a distance (many,)."""

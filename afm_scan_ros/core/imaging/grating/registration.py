@@ -45,8 +45,6 @@ STEEPEST = 0.9
 """Quantile of the slope from which on a height shows where an edge lies."""
 OF_CELL = 3
 """Intervals of f in each cell, as lines cross different parts of it. Those of g are one a cell."""
-HALF = 0.5
-"""Greatest distance of a ripple's amplitude from that of a mode, over the latter."""
 COLUMNS = 3
 """Turns in which the columns are moved one by one, before all coefficients are."""
 
@@ -94,7 +92,8 @@ def register(image: ScanImage, pitch: float) -> Registration:
     ringing = rough.by_columns()
     smooth = min(rough, ringing.without_ripple(), key=_State.mean_miss)
     state, rippling = _judged(smooth), _judged(ringing)
-    if rippling.rings_as_a_mode and rippling.explains_more(state):
+    rings = rippling.form.rings_as_a_mode(rippling.coefficients)
+    if rings and rippling.explains_more(state):
         state = rippling
     return _settled(state, image.name).with_turns_closed().registration(spacing)
 
@@ -193,11 +192,6 @@ class _State:
         moved = np.vstack([*kept, self.coefficients[2 * self.form.fast :]])
         cell = _mean_cell(form, moved, self.heights, self.weights, self.size)
         return evolve(self, form=form, coefficients=moved, cell=cell)
-
-    @property
-    def rings_as_a_mode(self) -> bool:
-        """Whether the ripple is nearer to that of a mode behind a triangle than half of it is."""
-        return abs(self.form.ripple_share(self.coefficients) - 1.0) < HALF
 
     def mean_miss(self) -> float:
         """Mean magnitude by which the mean cell misses the heights."""
