@@ -61,7 +61,8 @@ def identify_from_images(
 
     Arguments:
         images: each of at least three by three whole cells, and of a scan that nothing corrected.
-        pitch: distance of neighbouring cells, m, the same in both directions.
+        pitch: distance of neighbouring cells, m, the same in both directions; of a chessboard that
+            along a row.
         volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
             drive of 1 V stands for a commanded position of 1 µm.
         progress: is called with what is being done.
@@ -97,6 +98,10 @@ def identify_from_images(
     scales = _scales(volts_per_metre)
     for image in given:
         _both_directions(image)
+        if image.line_time is None:
+            raise InputError(
+                f"{image.name}: the time of a line is not known: give line_time, or --line-time"
+            )
     seen, errors = _registered(given, pitch, report)
     used, inaccurate = accurate_ones(seen, accuracy)
     errors += inaccurate

@@ -24,7 +24,10 @@ SUFFIX = ".gwy"
 @click.command()
 @click.argument("images", nargs=-1, required=True, type=FILE, metavar="IMAGE...")
 @click.option(
-    "--pitch", type=positive("m"), required=True, help="Distance of neighbouring cells, as 10um."
+    "--pitch",
+    type=positive("m"),
+    required=True,
+    help="Pitch of the grating, as 10um. Of a chessboard, that along a row.",
 )
 @click.option("--out", type=NEW_FILE, required=True, help="Model file to write.")
 @click.option(
@@ -56,7 +59,7 @@ SUFFIX = ".gwy"
 @click.option(
     "--line-time",
     type=positive("s"),
-    help="Time of trace and retrace together, if the file does not state it.",
+    help="Time of trace and retrace together, for files that do not state it.",
 )
 def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     images: tuple[Path, ...],
@@ -81,11 +84,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         refuse_existing(folder)
         targets = _targets(folder, (*images, *correct))
 
-    def read(path: Path) -> ScanImage:
-        found = read_image(path)
-        return found if line_time is None else evolve(found, line_time=line_time)
-
-    given, others = [read(path) for path in images], [read(path) for path in correct]
+    given, others = ([_timed(path, line_time) for path in paths] for paths in (images, correct))
     volts_per_metre = PER_MICROMETRE * (scale or 1.0)
     with working("grating", at_once=False) as report:
         found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
@@ -112,6 +111,16 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         for target, image in zip(targets[len(given) :], others, strict=True):
             _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
         click.echo(f"{folder} holds the corrected images, their pictures and the table.")
+
+
+def _timed(path: Path, line_time: float | None) -> ScanImage:
+    """Read an image; a ``line_time`` (s) is for a file that states none."""
+    found = read_image(path)
+    if line_time is None:
+        return found
+    if found.line_time is not None:
+        raise InputError(f"{path} states {found.line_time:.4g} s for a line: leave --line-time out")
+    return evolve(found, line_time=line_time)
 
 
 def _targets(folder: Path, images: Sequence[Path]) -> list[Path]:

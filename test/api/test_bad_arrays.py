@@ -208,6 +208,10 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
         lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5, line_time=-1.0),
         "image: line_time = -1.0: give a number above 0, in s",
     ),
+    "an image whose line takes an unknown time": (
+        lambda _: afm.identify_from_images([IMAGE], 1e-6),
+        "image: the time of a line is not known: give line_time, or --line-time",
+    ),
     "overscan in percent": (
         lambda _: afm.ScanImage(SQUARE, SQUARE, range_x=1e-5, range_y=1e-5, overscan=5.0),
         "image: overscan = 5.0: give a share of range_x",

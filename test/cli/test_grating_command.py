@@ -177,6 +177,16 @@ def test_a_trace_alone_is_refused(tmp_path: Path) -> None:
         )
 
 
+def test_a_time_beside_that_of_the_file_is_refused(tmp_path: Path) -> None:
+    path, flat = tmp_path / "timed.npz", np.zeros((16, 16))
+    np.savez(path, trace=flat, retrace=flat, range_x=1e-5, range_y=1e-5, line_time=4.0)
+    arguments = ["grating", str(path), "--pitch", "1um", "--line-time", "10ms"]
+    with pytest.raises(InputError, match=r"timed.npz states 4 s for a line: leave --line-time out"):
+        CliRunner().invoke(
+            cli, [*arguments, "--out", str(tmp_path / "m.yaml")], catch_exceptions=False
+        )
+
+
 def test_another_image_needs_a_folder(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     result = CliRunner().invoke(

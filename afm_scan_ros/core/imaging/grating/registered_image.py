@@ -27,7 +27,7 @@ MOST = 0.95
 WIDTH = 2.0
 """Uncertainty of 95 % certainty over a standard one."""
 PERCENT = 100.0
-NANO = 1e9
+MICRO, NANO = 1e6, 1e9
 ROUNDING = 1e-12
 """Share of the covariance's trace that keeps it positive definite."""
 
@@ -230,6 +230,7 @@ def figures_of(
     """Figures of an image that was registered in trace and retrace; y counts in ``known`` lines.
 
     The last two are errors of the distance of a pitch, rms over the image, with 95 % certainty.
+    Before them comes the distance of neighbouring cells: on a chessboard the pitch may be another.
     """
     seen = _motion(image, registration, known, registration.coefficients[np.newaxis])
     drawn = _motion(image, registration, known, _draws(registration))
@@ -239,6 +240,8 @@ def figures_of(
         )
         for name, axis, unit, rule in RULES
     ]
+    cells = MICRO * registration.pitch
+    found.append(ImageQuantity("distance of neighbouring cells", "x", "µm", cells, cells, cells))
     for axis, moved in (("x", drawn.trace[..., 0]), ("y", drawn.rows[..., 1])):
         uncertain = _pitch_error(moved, registration.pitch)
         found.append(ImageQuantity(PITCH, axis, "% rms", uncertain, uncertain, uncertain))
