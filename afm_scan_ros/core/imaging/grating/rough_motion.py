@@ -136,12 +136,9 @@ def _misses(where: Array, seen: Array, cell: UnitCell) -> Array:
 
 
 def with_ripple(
-    form: MotionForm,
-    coefficients: Array,
-    heights: Sequence[Array],
-    cell: UnitCell,
+    form: MotionForm, coefficients: Array, heights: Sequence[Array], cell: UnitCell
 ) -> tuple[MotionForm, Array]:
-    """Form with the ripple that is left once each column moves along the line to where it fits.
+    """Form with the ripple that shows once each column moves along the line to where it fits.
 
     ``heights`` (lines, pixels) are those of each direction. The motion in the new form, (count, 2),
     is the second value.
@@ -150,7 +147,7 @@ def with_ripple(
         _Columns.of(form, direction, coefficients, seen, cell)
         for direction, seen in enumerate(heights)
     ]
-    found, amplitude, smooth = _Ringing.through(columns, form.overscan).fitted()
+    found, amplitude, smooth = _RippleFit.through(columns, form.overscan).fitted()
     ringing = evolve(form, ripple=found)
     result = np.zeros((ringing.count, 2))
     result[2 * ringing.fast :] = coefficients[2 * form.fast :]
@@ -202,7 +199,7 @@ class _Columns:
 
 
 @frozen(eq=False)
-class _Ringing:
+class _RippleFit:
     """A smooth motion and a ripple through ``columns``, both directions at once.
 
     Values are ln periods, ln damping, the ripple's share of that of a line without hysteresis, and
@@ -216,7 +213,7 @@ class _Ringing:
     distance: float
 
     @classmethod
-    def through(cls, columns: Sequence[_Columns], overscan: float) -> "_Ringing":
+    def through(cls, columns: Sequence[_Columns], overscan: float) -> "_RippleFit":
         basis = spline_basis(middles(len(columns[0].root)), SMOOTHEST)
         distance = float(np.mean([np.ptp(each.along) for each in columns]))
         return cls(columns, overscan, basis, distance)
