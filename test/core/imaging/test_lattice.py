@@ -90,7 +90,7 @@ def period_seen(image: ScanImage) -> float:
 )
 def test_cells_must_show_how_both_directions_bend(shape: tuple[int, int], *, bend: bool) -> None:
     numbers = np.argwhere(np.ones(shape))
-    assert Cells(numbers, numbers.astype(float)).bend is bend
+    assert Cells(numbers, numbers.astype(float)).show_bending is bend
 
 
 def image_of_discs(count: int) -> Array:

@@ -21,11 +21,14 @@ SQUARE = np.sin(np.pi / 3.0)
 ALIKE = 0.5
 """Least share of the highest peak that another one of a lattice has."""
 NEGATIVE = 0.75
-"""Negative correlation of halfway shifts: midway between that of wide discs and a chessboard's."""
+"""Least negative correlation of shifts by half a cell, over that of a whole one.
+
+It is midway between a half, of discs that nearly touch, and one, of a chessboard.
+"""
 DIAGONAL = float(np.sqrt(0.5))
 """Side of a square over its diagonal."""
 TRUSTED = -np.log(DIAGONAL) / 3.0
-"""Logarithm of a scale that is taken for that of the scanner: a third of what lies between."""
+"""Logarithm of period over pitch up to which a reading is taken: a third of that between both."""
 LEVELS = float(np.sqrt(np.pi**2 / 8.0))
 """Rms over mean magnitude, midway between 1, of two levels, and that of a sum of two sines."""
 STARTS = 5
@@ -52,7 +55,7 @@ class Cells:
         return len(self.numbers)
 
     @property
-    def bend(self) -> bool:
+    def show_bending(self) -> bool:
         """Whether they show how both directions bend: three numbers along each, or more."""
         return all(len(np.unique(numbers)) > 2 for numbers in self.numbers.T)  # noqa: PLR2004
 
@@ -74,13 +77,13 @@ class Lattice:
     The first vector runs along the lines most, the second ahead of it. ``period`` is their length
     over the nominal pitch. ``negative`` is whether the middles of the cells show the negative of
     their corners: then the pitch is the diagonal of a cell, as of a chessboard, whose heights have
-    two ``levels``, or its side, as of a sum of two sines.
+    ``two_levels``, or its side, as of a sum of two sines.
     """
 
     vectors: Array
     period: float
     negative: bool
-    levels: bool
+    two_levels: bool
 
     @property
     def share(self) -> float:
@@ -93,7 +96,7 @@ class Lattice:
         for share in (1.0, DIAGONAL):
             if abs(np.log(self.period / share)) < TRUSTED:
                 return share
-        return DIAGONAL if self.levels else 1.0
+        return DIAGONAL if self.two_levels else 1.0
 
 
 def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
@@ -194,7 +197,7 @@ def cells_of(heights: Sequence[Array], vectors: Array) -> list[Cells]:
         if not best or min(map(len, found)) > min(map(len, best)):
             best = found
     fewest = min(map(len, best))
-    if fewest < FEWEST or not all(each.bend for each in best):
+    if fewest < FEWEST or not all(each.show_bending for each in best):
         raise InputError(
             f"the cells of the grating that were recognised are too few ({fewest}): give an image"
             " of at least three by three whole ones, with less noise"

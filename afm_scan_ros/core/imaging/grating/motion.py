@@ -40,6 +40,11 @@ def middles(count: int) -> Array:
     return (2.0 * np.arange(count) + 1.0) / count - 1.0
 
 
+def since_turn(direction: int, pixels: Array) -> Array:
+    """Time since a line began, over that of a line one way, at pixels from -1 to 1: (n,)."""
+    return np.asarray(0.5 * (1.0 - pixels if direction else 1.0 + pixels))
+
+
 @frozen
 class Ripple:
     """A damped oscillation after each turn: its ``periods`` in a line one way, and ``damping``."""
@@ -115,8 +120,7 @@ class MotionForm:
         smooth = spline_basis(pixels, self.pixel_intervals)
         if self.ripple is None:
             return smooth
-        passed = 0.5 * (1.0 - pixels if direction else 1.0 + pixels)
-        return np.hstack([smooth, self.ripple.columns(passed)])
+        return np.hstack([smooth, self.ripple.columns(since_turn(direction, pixels))])
 
     def part(self, direction: int) -> slice:
         """Coefficients of f in a direction."""

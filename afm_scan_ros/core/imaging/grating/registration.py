@@ -26,7 +26,12 @@ from afm_scan_ros.core.imaging.grating.equations import (
 )
 from afm_scan_ros.core.imaging.grating.features import levelled
 from afm_scan_ros.core.imaging.grating.motion import MotionForm
-from afm_scan_ros.core.imaging.grating.rough_motion import carried_over, first_motion, with_ripple
+from afm_scan_ros.core.imaging.grating.rough_motion import (
+    NORMAL,
+    carried_over,
+    first_motion,
+    with_ripple,
+)
 from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell, mean_cell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
@@ -37,8 +42,6 @@ SETTLED = 0.25
 """Change of the positions, over their standard deviation (rms), below which the turns end."""
 FREEDOM = 4.0
 """Degrees of freedom of the Student distribution that the faults of whole cells have."""
-NORMAL = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 FINEST = 96
 """Points of the mean cell along each side, at most."""
 STEEPEST = 0.9

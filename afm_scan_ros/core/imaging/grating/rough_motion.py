@@ -20,7 +20,13 @@ from afm_scan_ros.core.imaging.grating.features import (
     cells_of,
     lattice_of,
 )
-from afm_scan_ros.core.imaging.grating.motion import MotionForm, Ripple, middles, spline_basis
+from afm_scan_ros.core.imaging.grating.motion import (
+    MotionForm,
+    Ripple,
+    middles,
+    since_turn,
+    spline_basis,
+)
 from afm_scan_ros.core.imaging.grating.unit_cell import UnitCell
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
@@ -189,7 +195,7 @@ class _Columns:
         places = middles(form.pixels)
         before = form.along(direction, places) @ coefficients[form.part(direction)]
         along = before @ way
-        passed = 0.5 * (1.0 - places if direction else 1.0 + places)
+        passed = since_turn(direction, places)
         across, root = before - np.outer(along, way), np.sqrt(weight / weight.mean())
         return cls(along + shifts, way, across, root, passed, -1.0 if direction else 1.0)
 
