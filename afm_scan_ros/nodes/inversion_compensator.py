@@ -31,7 +31,8 @@ from afm_scan_ros.nodes.parameters import (
     inverses_of,
     model_of,
 )
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
+from afm_scan_ros.nodes.peers import RUNNING, Report
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 
 DEFAULTS = InverseSettings()
 

@@ -3,18 +3,24 @@
 from array import array
 from collections import deque
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from attrs import asdict, define, field
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.ros import Header, Image, Message, NodeState, Publisher, RCLError, TrackingError
-from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage
-from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
+from afm_scan_ros.msg import MonitorSample as MonitorSampleMessage
+from afm_scan_ros.msg import NodeState, TrackingError
+from afm_scan_ros.msg import ScanInfo as ScanInfoMessage
+
+Message: TypeAlias = Any
+"""Of a class that rosidl makes from a definition in ``msg/``."""
 
 MAX_BLOCK = 10_000
 """Most samples that one message may carry."""

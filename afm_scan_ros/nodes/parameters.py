@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
@@ -16,14 +19,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.records import from_mapping, naming
-from afm_scan_ros.ros import (
-    FloatingPointRange,
-    IntegerRange,
-    Message,
-    Node,
-    ParameterDescriptor,
-    ParameterException,
-)
+from afm_scan_ros.nodes.messages import Message
 
 Value: TypeAlias = bool | int | float | str | list[str]
 
@@ -81,6 +77,16 @@ def model_of(settings: Mapping[str, Any]) -> ScannerModel:
 def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
     """Declare parameters and return their values; raises InputError for one that does not fit."""
     return {parameter.name: _declare(node, parameter) for parameter in parameters}
+
+
+def undeclared_parameters(node: Node) -> list[str]:
+    """Names that the command line or a parameter file set and the node never declared."""
+    given = node._parameter_overrides  # noqa: SLF001 - rclpy has no public name for it
+    return sorted(
+        name
+        for name in given
+        if not name.startswith("qos_overrides.") and not node.has_parameter(name)
+    )
 
 
 def scan_spec_parameters() -> list[NodeParameter]:

@@ -23,7 +23,8 @@ from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.parameters import ADAPTATION, MODEL_FILE, NodeParameter, model_of
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
 
 class ResidualMonitor(StreamReader):

@@ -6,24 +6,22 @@ from collections.abc import Callable, Iterable, Mapping
 from re import sub
 from threading import Event, RLock, Thread
 
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.messages import AFTERLIFE, state_message
+from afm_scan_ros.nodes.diagnostics import Diagnostics
+from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.parameters import NodeParameter, declare
-from afm_scan_ros.nodes.topics import (
-    DONE,
-    FAILED,
-    NODE_STATE,
-    READY,
-    RUNNING,
-    Diagnostics,
-    NodeTopic,
-    Peers,
-    Report,
-)
-from afm_scan_ros.ros import Message, Node, Publisher, Subscription
+from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
 
 HEARTBEAT = 0.05
+"""Seconds between two states of a node."""
+WATCH = 0.02
+"""Seconds between two looks at the other nodes."""
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
@@ -37,9 +35,16 @@ COMMON = (
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
     ),
     NodeParameter(
+        "progress_timeout_s",
+        0.3,
+        "Scan time in which the slowest node may finish no sample until the drive ramps down",
+        low=0.1,
+    ),
+    NodeParameter("time_scale", 1.0, "Duration over scan time: 1 for real time", low=0.0),
+    NodeParameter(
         "real_time",
         default=True,
-        description="Whether a node that computes for long counts as silent; false in simulation",
+        description="Whether samples have to advance by the clock; false in simulation",
     ),
 )
 
@@ -56,7 +61,8 @@ class ScanNode(Node, ABC):
 
     def __init__(self) -> None:
         super().__init__(self.NAME)
-        self.settings = declare(self, (*COMMON, *self.PARAMETERS))
+        parameters = {each.name: each for each in (*COMMON, *self.PARAMETERS)}
+        self.settings = declare(self, parameters.values())
         self.info: ScanInfo | None = None
         self.peers = Peers()
         self.state = READY
@@ -66,19 +72,25 @@ class ScanNode(Node, ABC):
         self.ready = False
         self._reported = 0
         self._logged = ""
-        self._next_heartbeat = self._started = self._ticked = time.monotonic()
-        self._uncrowded = self._all_heard_at = self._started
+        self._next_watch = self._started = self._ticked = self._advanced = time.monotonic()
+        self._all_heard_at = self._started
         self.calls = 0
         self.busy = 0.0
         self._leave_at: float | None = None
         self._reporting = RLock()
         self._ended = Event()
         self._heartbeat = Thread(target=self._beat, daemon=True)
-        self.inputs: list[str] = []
+        self._readers: list[tuple[Subscription, Callable[[Message, int], None]]] = []
+        self._publishers_of: dict[str, dict[bytes, str]] = {}
+        self._longest_block = 0.0
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
         )
         self._diagnostics = Diagnostics(self)
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Compute once what is slow the first time, before the node joins ROS."""
 
     @property
     def scan(self) -> ScanInfo:
@@ -108,31 +120,56 @@ class ScanNode(Node, ABC):
     def hear_others(self) -> None:
         """Begin to hear the others, by a reader made last: whoever is heard knows all of ours.
 
-        DDS tells of readers in the order in which they were made. Where no real scanner waits, a
-        thread reports from now on, so that a node is heard while a callback of its own computes.
+        DDS tells of readers in the order in which they were made. A thread reports from now on, so
+        that a node is heard while a callback of its own computes: whether it works is seen by its
+        progress.
         """
         self.subscribe(NODE_STATE, self._hear)
         reads, writes = (_named(each) for each in (self.subscriptions, self.publishers))
         name = self.get_fully_qualified_name()
         self.get_logger().info(f"{name} reads {reads}; it publishes {writes}")
-        if not self.settings["real_time"]:
-            self._heartbeat.start()
+        self._heartbeat.start()
 
     def subscribe(
         self, topic: NodeTopic, callback: Callable[[Message], object], *, raw: bool = False
-    ) -> None:
-        """Call back with each message of a topic, or with its bytes if ``raw``.
+    ) -> Subscription:
+        """Call back with each message of a topic, or with its bytes if ``raw``."""
 
-        Counted in ``calls`` and ``busy`` (s).
-        """
-
-        def called(message: Message) -> None:
+        def called(message: Message, information: Mapping[str, int]) -> None:
             self.calls += 1
             began = time.monotonic()
-            callback(message)
+            number = information["publication_sequence_number"]
+            if self.accepts(topic, number):
+                callback(message)
             self.busy += time.monotonic() - began
 
-        self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
+        made = self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
+        self._readers.append((made, called))
+        return made
+
+    def accepts(self, topic: NodeTopic, number: int) -> bool:  # noqa: ARG002 - a subclass's to use
+        """Return whether to take the message of this ``number`` among those of its publisher."""
+        return True
+
+    def take_messages(self, seconds: float) -> bool:
+        """Call back for messages that have arrived, for so long at most; return whether any had.
+
+        An executor builds its set of waitables anew for each message, which takes several times as
+        long as the message.
+        """
+        deadline, before = time.monotonic() + seconds, self.calls
+        busy = True
+        while busy and time.monotonic() < deadline:
+            busy = False
+            for subscription, callback in self._readers:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(
+                        subscription.msg_type, subscription.raw
+                    )
+                if taken is not None:
+                    callback(*taken)
+                    busy = True
+        return self.calls != before
 
     def all_heard(self) -> None:
         """Note that no message that has arrived waits to be heard."""
@@ -152,28 +189,47 @@ class ScanNode(Node, ABC):
         if now - self._ticked > INATTENTION:
             self.peers.listen_anew(now)
         self._ticked = now
-        if now >= self._next_heartbeat:
-            self._next_heartbeat = now + HEARTBEAT
-            if not self.leaving:
-                self.watch(now)
-            self.report()
+        if now >= self._next_watch and not self.leaving:
+            self._next_watch = now + WATCH
+            self.watch(now)
         return not self.leaving and self.step()
 
     def watch(self, now: float) -> None:
-        """Raise ScanError where another node failed, fell silent, or publishes in our place."""
-        timeout = self.settings["liveness_timeout_s"]
-        trouble = self.peers.failure() or self.silence(self.watched(), now, timeout)
+        """Raise ScanError where another node failed, fell silent, or publishes in our place.
+
+        And where samples stand still while the scan runs.
+        """
+        trouble = self.peers.failure() or self.silence(self.watched(), now, self.patience())
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
+        if trouble is None and self.info is not None and self.state == RUNNING:
+            own = self._own_report()
+            trouble = self.peers.standstill(own, self.info.window, now, self._longest_standstill())
         if trouble:
             raise ScanError(trouble)
-        self._watch_publishers(now)
+        self._watch_publishers()
+
+    def patience(self) -> float:
+        """Return how long (s) another node may be silent."""
+        return float(self.settings["liveness_timeout_s"])
+
+    def _longest_standstill(self) -> float:
+        """Return how long (s) samples may stand still: a block is output meanwhile."""
+        if not self.settings["real_time"]:
+            return float(self.settings["liveness_timeout_s"])
+        scale = max(1.0, self.settings["time_scale"])
+        return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
+
+    def _own_report(self) -> Report:
+        name, now = self.get_name(), time.monotonic()
+        return Report(
+            name, self.scan.scan_id, self.state, self.next_sample, self.reason, now, self._advanced
+        )
 
     def begin(self, info: ScanInfo) -> None:
         """Begin to take part in a scan: watch the others that do."""
-        others = (name for name in info.nodes if name != self.get_name())
         self.info, self._started = info, time.monotonic()
-        self.peers.follow(others, info.scan_id, self._started)
+        self.peers.follow(info.nodes, self.get_name(), info.scan_id, self._started)
 
     def listen_to(self, topic: NodeTopic) -> None:
         """Name a topic, read or written here, that one node alone is to publish."""
@@ -200,6 +256,8 @@ class ScanNode(Node, ABC):
 
     def advance_to(self, sample: int) -> None:
         """Record progress, and publish it before the source would wait for it."""
+        if sample != self.next_sample:
+            self._advanced = time.monotonic()
         self.next_sample = sample
         if self.info is not None and sample - self._reported >= self.info.window // 4:
             self.report()
@@ -254,6 +312,7 @@ class ScanNode(Node, ABC):
         self._ended.set()
         if self._heartbeat.is_alive():
             self._heartbeat.join()
+        self._readers.clear()
         super().destroy_node()
 
     def _log_news(self) -> None:
@@ -278,22 +337,25 @@ class ScanNode(Node, ABC):
             now = time.monotonic()
             self.peers.hear(Report(m.node, m.scan_id, m.state, m.next_sample, m.reason, now))
 
-    def _watch_publishers(self, now: float) -> None:
-        """Allow a second publisher of a topic for as long as it may be one that was killed.
+    def pin_publishers(self) -> None:
+        """Take the publishers that there are now as those of the scan."""
+        self._publishers_of = {topic: self._gids(topic) for topic in self.inputs}
 
-        Each node drops that at a moment of its own. One that lives is refused by what it says.
+    def _gids(self, topic: str) -> dict[bytes, str]:
+        """Return the names of the nodes that publish a topic, by the identifiers of the writers.
+
+        By DDS's name of the topic, since rclpy remaps a name of ROS once more.
         """
-        counts = {topic: self.count_publishers(topic) for topic in self.inputs}
-        crowded = next((topic for topic, count in counts.items() if count > 1), None)
-        if crowded is None:
-            self._uncrowded = now
-            return
-        # rclpy remaps this name once more, which may lead elsewhere: the count is the one above.
-        found = self.get_publishers_info_by_topic(crowded)
-        types = sorted({each.topic_type for each in found})
-        if len(types) > 1 or now - self._uncrowded > AFTERLIFE:
-            of = f", of {' and '.join(types)}" if len(types) > 1 else ""
-            raise ScanError(f"{crowded} has {counts[crowded]} publishers{of}: stop all but one")
+        found = self.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True)
+        return {bytes(each.endpoint_gid): each.node_name for each in found}
+
+    def _watch_publishers(self) -> None:
+        """Raise ScanError where a topic of the scan has got another publisher."""
+        for topic, pinned in self._publishers_of.items():
+            if self.count_publishers(topic) > len(pinned):
+                others = sorted({*self._gids(topic).values()} - {*pinned.values()})
+                named = f" ({', '.join(others)})" if others else ""
+                raise ScanError(f"{topic} has another publisher{named}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
+from rclpy._rclpy_pybind11 import RCLError
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineErrors, MonitorSamples
@@ -12,7 +13,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import ReceivedBlock, monitor_message, tracking_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
-from afm_scan_ros.ros import RCLError
 
 
 class TrackingMonitor(StreamReader):

@@ -1,6 +1,7 @@
 """Node: publishes the desired displacement of a scan."""
 
 from attrs import evolve
+from std_srvs.srv import Trigger
 
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.model import INVERSES
@@ -8,6 +9,7 @@ from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import (
     MODEL_FILE,
     NodeParameter,
@@ -15,8 +17,8 @@ from afm_scan_ros.nodes.parameters import (
     model_of,
     scan_spec,
 )
-from afm_scan_ros.nodes.topics import DESIRED, RUNNING
-from afm_scan_ros.ros import Message, Trigger
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import DESIRED
 
 STOPPED = "stopped by request"
 """Begins the reason of a scan that is done, though not whole."""
