@@ -10,14 +10,11 @@ from attrs import asdict, define, field
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.streams import LineError, MonitorSample
+from afm_scan_ros.core.streams import MAX_BLOCK, LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.ros import Header, Image, Message, NodeState, Publisher, RCLError, TrackingError
 from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage
 from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
-
-MAX_BLOCK = 10_000
-"""Most samples that one message may carry."""
 
 
 class ReceivedBlock(Protocol):

@@ -8,8 +8,9 @@ from threading import Event, RLock, Thread
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.messages import AFTERLIFE, state_message
-from afm_scan_ros.nodes.parameters import NodeParameter, declare
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.topics import (
     DONE,
     FAILED,

@@ -9,14 +9,12 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
-from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
-from afm_scan_ros.nodes.messages import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.run import IDLE
 from afm_scan_ros.nodes.topics import ACHIEVED, DONE, DRIVE, RUNNING, TRUE, NodeTopic
@@ -166,21 +164,14 @@ class ScannerNode(ManagedConsumer):
         moved, self._moving = self._moving, []
         self._driving += time.monotonic() - self._asked
         self._move_on()
-        start = answer.measured.first_sample
-        for block, last in moved:
-            stop = min(end(block), end(answer.measured))
-            for first in range(start, stop, MAX_BLOCK):
-                until = min(first + MAX_BLOCK, stop)
-                self._send(answer, first, until, last=last and until == stop)
-            start = max(start, stop)
-            self.advance_to(end(block))
-            if last:
-                self.go(DONE)
-
-    def _send(self, answer: Displacement, start: int, stop: int, *, last: bool) -> None:
-        self.send(ACHIEVED, part(answer.measured, start, stop), last=last)
-        if answer.true is not None:
-            self.send(TRUE, part(answer.true, start, stop), last=last)
+        last = moved[-1][1]
+        for topic, displacement in ((ACHIEVED, answer.measured), (TRUE, answer.true)):
+            if displacement is not None:
+                for part in cut_as((block for block, _ in moved), displacement):
+                    self.send(topic, part, last=last and end(part) == end(displacement))
+        self.advance_to(end(moved[-1][0]))
+        if last:
+            self.go(DONE)
 
     def _check(self, info: ScanInfo) -> None:
         """Raise InputError where the settings contradict what is said of the scan."""
