@@ -22,7 +22,7 @@ from afm_scan_ros.files import model_file, plant_file, share_directory
 from afm_scan_ros.files.records import key_of
 from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes import topics
-from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
 from afm_scan_ros.nodes.scan_node import COMMON
 

@@ -35,7 +35,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant, load_scan, save_scan
-from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.close_loop import close_loop_page, final_text, reported, round_result
 from afm_scan_ros.report.diagnosis_json import closed_loop_document, diagnosis_of, save_diagnosis
 from afm_scan_ros.report.diagnosis_page import write_diagnosis

@@ -29,9 +29,9 @@ from afm_scan_ros.cli.options import in_lines
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.nodes import NODES, start
+from afm_scan_ros.nodes.flow import STOPPED
 from afm_scan_ros.nodes.together import GRACE, Ended, run_together
 from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING, SCAN_INFO
-from afm_scan_ros.nodes.trajectory_generator import STOPPED
 from afm_scan_ros.ros import (
     ALONE,
     Message,

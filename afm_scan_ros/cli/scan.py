@@ -38,7 +38,7 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_scan, node_parameters
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.nodes.parameters import inverses_of
 
 COMPENSATOR = "inversion_compensator"

@@ -1,7 +1,7 @@
 """Streams of blocks: aligned, gathered to whole lines, and what is read off them."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import ceil, nan
 
 import numpy as np
@@ -21,6 +21,29 @@ def part(trace: Trace, start: int, stop: int) -> Trace:
 def end(trace: Trace) -> int:
     """Return the first sample after a trace."""
     return trace.first_sample + trace.x.size
+
+
+MAX_BLOCK = 10_000
+"""Most samples that one message may carry."""
+
+
+def cut(trace: Trace) -> Iterator[Trace]:
+    """Yield a trace in blocks of ``MAX_BLOCK`` samples at most."""
+    for first in range(trace.first_sample, end(trace), MAX_BLOCK):
+        yield part(trace, first, min(first + MAX_BLOCK, end(trace)))
+
+
+def cut_as(blocks: Iterable[Trace], trace: Trace) -> Iterator[Trace]:
+    """Yield a trace cut where blocks end, and as ``cut`` does.
+
+    Where it begins or ends before these blocks, as late readings of them do, so does what is
+    yielded.
+    """
+    start = trace.first_sample
+    for block in blocks:
+        stop = max(start, min(end(block), end(trace)))
+        yield from cut(part(trace, start, stop))
+        start = stop
 
 
 @define

@@ -11,64 +11,14 @@ from attrs import evolve
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import MAX_BLOCK, Outbox, block_message, info_message
-from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.flow import MAX_MESSAGE_RATE, USUAL_WINDOW, block_size_at
+from afm_scan_ros.nodes.messages import Outbox, block_message, info_message
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
-
-MAX_MESSAGE_RATE = 200.0
-"""Messages a second that a topic may carry in real time."""
-
-USUAL_RATE = 50.0
-"""Blocks a second of scan time, where nobody states their size: rclpy passes on a thousand."""
-LEAST_BLOCK = 100
-"""Samples."""
-USUAL_WINDOW = 20
-"""Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
+from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 DOUBT = 0.3
 """Silence of a node, s, during which nothing begins and nothing is sent."""
-
-FLOW = (
-    NodeParameter(
-        "block_size",
-        0,
-        f"Samples in a block; 0 for {USUAL_RATE:g} blocks a second of the scan, of"
-        f" {LEAST_BLOCK} to {MAX_BLOCK} samples",
-        low=0,
-        high=MAX_BLOCK,
-    ),
-    NodeParameter(
-        "window",
-        0,
-        f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
-        low=0,
-    ),
-    NodeParameter(
-        "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
-    ),
-    NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
-    NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
-    NodeParameter(
-        "sampling_instant",
-        "before_update",
-        "When the sensor's samples are taken, seen from the converter's update",
-        choices=("before_update", "after_update"),
-    ),
-    NodeParameter("trigger_offset_s", 0.0, "Time from the converter's update to the sample"),
-)
-
-
-def block_size_at(sample_period: float) -> int:
-    """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
-    return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
-
-
-def taking_part(*nodes: str) -> NodeParameter:
-    """Declare the nodes that take part in a scan beside its source."""
-    return NodeParameter(
-        "required_nodes", list(nodes), "Nodes that take part, in the order of data flow"
-    )
 
 
 class BlockSource(ScanNode):
@@ -83,6 +33,7 @@ class BlockSource(ScanNode):
         self._block_size = 0
         self._hindered = time.monotonic()
         self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
+        self._announced = False
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
             self.listen_to(own)
@@ -102,7 +53,10 @@ class BlockSource(ScanNode):
         return (self.get_name(), *self.settings["required_nodes"])
 
     def announce(self, info: ScanInfo) -> None:
-        """Make the scan known, with its window; raises InputError where it cannot be paced so."""
+        """State the scan, with its window; raises InputError where it cannot be paced so.
+
+        It is published by the first step, when the others hear that this node is there.
+        """
         given = self.settings
         self._block_size = given["block_size"] or block_size_at(info.sample_period)
         info = evolve(
@@ -115,10 +69,13 @@ class BlockSource(ScanNode):
         self.total = info.total_samples
         self.begin(info)
         self.ready = True
-        self._announcement.publish(info_message(info))
+        self.note_block(self._block_size)
 
     def step(self) -> bool:
         """Begin when all are ready, send what may be sent, end when all are done."""
+        if not self._announced:
+            self._announced = True
+            self._announcement.publish(info_message(self.scan))
         if self.state == READY:
             self._begin_when_possible()
         elif self.next_sample < self.total:
@@ -152,6 +109,8 @@ class BlockSource(ScanNode):
             self.reason = f"waits for the state of {', '.join(unheard)}"
         else:
             self._start = now
+            self.pin_publishers()
+            self.peers.begin(now)
             self.go(RUNNING)
 
     def _hindrance(self, now: float) -> str:
@@ -159,6 +118,8 @@ class BlockSource(ScanNode):
             return f"waits for {', '.join(waiting)}"
         if silent := self.peers.silence(self.peers.names, now, DOUBT):
             return f"waits, for {silent}"
+        if crowded := self.crowded():
+            return crowded
         readers = self._blocks.publisher.get_subscription_count()
         if readers < (wanted := self.settings["min_subscriptions"]):
             return f"waits for {wanted} readers of {self._topic.name}"

@@ -7,7 +7,8 @@ from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.drives.experiments import KINDS, resized
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.drive_files import read_drive
-from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
+from afm_scan_ros.nodes.block_source import BlockSource
+from afm_scan_ros.nodes.flow import FLOW, taking_part
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.topics import DRIVE
 

@@ -1,30 +1,24 @@
-"""Declared parameters: name, type, description, range; all are fixed when the node starts."""
+"""Parameters of the nodes: name, type, description, range; and what is made of their values."""
 
-import math
-import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.node import Node
 
+from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
+from afm_scan_ros.core.learning.line_feedback import LEAD
 from afm_scan_ros.core.limits import DriveLimits
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
+from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
+from afm_scan_ros.core.scan_inversion import InversionSettings
+from afm_scan_ros.core.scan_spec import human_name, scan_parameters
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.records import from_mapping, naming
-from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.files.records import naming
 
 Value: TypeAlias = bool | int | float | str | list[str]
-
-_LARGEST_INT = 2**31 - 1  # which a slider of rqt_reconfigure can hold
-_LARGEST_FLOAT = sys.float_info.max
 
 
 @frozen
@@ -60,6 +54,84 @@ ADAPTATION = (
 )
 
 
+_DEFAULT = InverseSettings()
+INVERSION = (
+    NodeParameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
+    NodeParameter(
+        "hysteresis_inverse",
+        _DEFAULT.hysteresis_inverse,
+        "Inverse of hysteresis: exact, the paper's direct inverse, or the model's choice",
+        choices=("as_identified", "exact", "direct"),
+    ),
+    NodeParameter(
+        "weight_corner_hz",
+        _DEFAULT.weight_corner,
+        "Frequency above which the inverse limits the drive",
+        low=1.0,
+    ),
+    NodeParameter(
+        "weight_order", _DEFAULT.weight_order, "Steepness of that transition", low=1, high=10
+    ),
+    NodeParameter(
+        "preview_ms", _DEFAULT.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
+    ),
+    *DRIVE_LIMITS,
+    NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
+    NodeParameter(
+        "preflight_samples",
+        5_000_000,
+        "Largest scan, in samples, that is inverted before it begins",
+        low=0,
+    ),
+    NodeParameter(
+        "line_feedback",
+        default=False,
+        description="Whether offset, tilt and gain are corrected from the last lines",
+    ),
+    NodeParameter(
+        "feedback_latency_ms",
+        LEAD * 1e3,
+        "With line_feedback or adapt: longest time from a sample's drive to its reading",
+        low=0.0,
+        high=10_000.0,
+    ),
+    *ADAPTATION,
+)
+ALARMS = (
+    NodeParameter(
+        "alarm",
+        ALARM_RATIO,
+        "Residual over model discrepancy that makes a line suspect",
+        low=1.0,
+    ),
+    NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
+)
+
+
+def defaults(parameters: Iterable[NodeParameter]) -> dict[str, Any]:
+    """Return the values of parameters that nobody sets."""
+    return {parameter.name: parameter.default for parameter in parameters}
+
+
+def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
+    """Return how a scan is inverted by the parameters ``INVERSION``; refuses limits of zero."""
+    given = settings
+    return InversionSettings(
+        inverses_of(given["inverses"], INVERSES),
+        drive_limits(given),
+        InverseSettings(
+            hysteresis_inverse=given["hysteresis_inverse"],
+            weight_corner=given["weight_corner_hz"],
+            weight_order=given["weight_order"],
+            preview=given["preview_ms"] * 1e-3,
+        ),
+        line_feedback=given["line_feedback"],
+        adapt=given["adapt"],
+        latency=given["feedback_latency_ms"] * 1e-3,
+        time_constant=given["adapt_time_constant_s"],
+    )
+
+
 def drive_limits(settings: Mapping[str, Any]) -> DriveLimits:
     """Return the limits among a node's parameters; raises InputError where one is zero."""
     try:
@@ -74,29 +146,9 @@ def model_of(settings: Mapping[str, Any]) -> ScannerModel:
         return load_model(Path(settings["model_file"]))
 
 
-def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
-    """Declare parameters and return their values; raises InputError for one that does not fit."""
-    return {parameter.name: _declare(node, parameter) for parameter in parameters}
-
-
-def undeclared_parameters(node: Node) -> list[str]:
-    """Names that the command line or a parameter file set and the node never declared."""
-    given = node._parameter_overrides  # noqa: SLF001 - rclpy has no public name for it
-    return sorted(
-        name
-        for name in given
-        if not name.startswith("qos_overrides.") and not node.has_parameter(name)
-    )
-
-
 def scan_spec_parameters() -> list[NodeParameter]:
     """Return the parameters of a scan in their file units, such as ``range_x_um``."""
     return [_for_people(attribute) for attribute in scan_parameters()]
-
-
-def scan_spec(node: Node) -> ScanSpec:
-    """Declare the parameters of a scan and return it; raises InputError naming what is wrong."""
-    return from_mapping(ScanSpec, declare(node, scan_spec_parameters()), node.get_name())
 
 
 def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:
@@ -128,34 +180,3 @@ def _for_people(attribute: "Attribute[Any]") -> NodeParameter:
 
 def _in_unit(value: float, scale: float) -> float:
     return float(f"{value / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
-
-
-def _declare(node: Node, parameter: NodeParameter) -> Value:
-    name, default, choices = parameter.name, parameter.default, parameter.choices
-    try:
-        value: Value = node.declare_parameter(name, default, _descriptor(parameter)).value
-    except ParameterException as error:
-        raise InputError(f"parameter {name}: {error}") from error
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"parameter {name}: {value} is not finite; give a number")
-    if choices and value not in choices:
-        raise InputError(f"parameter {name}: '{value}' is not one of {', '.join(choices)}")
-    return value
-
-
-def _descriptor(parameter: NodeParameter) -> Message:
-    descriptor = ParameterDescriptor(description=parameter.description, read_only=True)
-    if parameter.choices:
-        descriptor.additional_constraints = f"one of {', '.join(parameter.choices)}"
-    low, high = parameter.low, parameter.high
-    if low is None and high is None:
-        return descriptor
-    whole = isinstance(parameter.default, int)
-    number, largest = (int, _LARGEST_INT) if whole else (float, _LARGEST_FLOAT)
-    start = number(-largest if low is None else low)
-    stop = number(largest if high is None else high)
-    if whole:
-        descriptor.integer_range = [IntegerRange(from_value=start, to_value=stop, step=1)]
-    else:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=start, to_value=stop)]
-    return descriptor

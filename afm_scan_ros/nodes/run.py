@@ -14,9 +14,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import state_message
-from afm_scan_ros.nodes.parameters import undeclared_parameters
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
 from afm_scan_ros.nodes.topics import NODE_STATE
@@ -59,8 +59,8 @@ def _made(kind: type[ScanNode], warnings: Iterable[str]) -> ScanNode:
     except InputError as error:
         _report_refusal(kind.NAME, error)
         raise
-    undeclared = undeclared_parameters(node)
-    for warning in (*warnings, *(f"parameter {each} does nothing" for each in undeclared)):
+    idle = (f"parameter {each} does nothing: {node.NAME} has none" for each in undeclared(node))
+    for warning in (*warnings, *idle):
         node.get_logger().warning(warning)
     return node
 

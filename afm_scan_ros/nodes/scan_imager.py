@@ -12,10 +12,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.lines import Frame, ImageLine, LineImager, frame_of
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import Aligner, end, part
-from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.core.imaging.lines import ImageLines, frame_of
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
@@ -23,31 +20,6 @@ from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
 from afm_scan_ros.simulation.sample import Grating, Sample
-
-
-class ImageLines:
-    """Reads a sample's height at the achieved position and places it at the desired one.
-
-    The tip touches the sample on the lines alone.
-    """
-
-    def __init__(self, spec: ScanSpec, frame: Frame, sample: Sample) -> None:
-        self._sample = sample
-        self._where = phases(spec).lines
-        self._imager = LineImager(spec, frame)
-        self._aligner = Aligner(("desired_displacement", "achieved_displacement"))
-
-    def add(self, name: str, block: Trace) -> Iterator[ImageLine]:
-        """Take a block of one of the two topics; yield the lines that it makes whole."""
-        self._aligner.add(name, block)
-        for run in self._aligner.ready():
-            start = max(self._where.start, run[0].first_sample)
-            stop = min(self._where.stop, end(run[0]))
-            if start < stop:
-                desired, achieved = (part(trace, start, stop) for trace in run)
-                heights = self._sample.height(achieved.x, achieved.y)
-                yield from self._imager.add(desired.x, heights)
-
 
 MICRO, NANO = 1e-6, 1e-9
 

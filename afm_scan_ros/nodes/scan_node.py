@@ -12,9 +12,10 @@ from rclpy.subscription import Subscription
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import Message, state_message
-from afm_scan_ros.nodes.parameters import NodeParameter, declare
+from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
 
@@ -80,7 +81,7 @@ class ScanNode(Node, ABC):
         self._reporting = RLock()
         self._ended = Event()
         self._heartbeat = Thread(target=self._beat, daemon=True)
-        self._readers: list[tuple[Subscription, Callable[[Message, int], None]]] = []
+        self._readers: list[tuple[Subscription, Callable[[Message, Mapping[str, int]], None]]] = []
         self._publishers_of: dict[str, dict[bytes, str]] = {}
         self._longest_block = 0.0
         self._state_publisher = self.create_publisher(
@@ -131,25 +132,21 @@ class ScanNode(Node, ABC):
         self._heartbeat.start()
 
     def subscribe(
-        self, topic: NodeTopic, callback: Callable[[Message], object], *, raw: bool = False
-    ) -> Subscription:
-        """Call back with each message of a topic, or with its bytes if ``raw``."""
+        self, topic: NodeTopic, callback: Callable[[Message, int], object], *, raw: bool = False
+    ) -> None:
+        """Call back with each message of a topic, or with its bytes if ``raw``.
+
+        And with its number among those of its publisher.
+        """
 
         def called(message: Message, information: Mapping[str, int]) -> None:
             self.calls += 1
             began = time.monotonic()
-            number = information["publication_sequence_number"]
-            if self.accepts(topic, number):
-                callback(message)
+            callback(message, information["publication_sequence_number"])
             self.busy += time.monotonic() - began
 
         made = self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
         self._readers.append((made, called))
-        return made
-
-    def accepts(self, topic: NodeTopic, number: int) -> bool:  # noqa: ARG002 - a subclass's to use
-        """Return whether to take the message of this ``number`` among those of its publisher."""
-        return True
 
     def take_messages(self, seconds: float) -> bool:
         """Call back for messages that have arrived, for so long at most; return whether any had.
@@ -204,7 +201,7 @@ class ScanNode(Node, ABC):
             trouble = self._late(now)
         if trouble is None and self.info is not None and self.state == RUNNING:
             own = self._own_report()
-            trouble = self.peers.standstill(own, self.info.window, now, self._longest_standstill())
+            trouble = self.peers.standstill(own, self.info.window, now, self.longest_standstill())
         if trouble:
             raise ScanError(trouble)
         self._watch_publishers()
@@ -213,7 +210,7 @@ class ScanNode(Node, ABC):
         """Return how long (s) another node may be silent."""
         return float(self.settings["liveness_timeout_s"])
 
-    def _longest_standstill(self) -> float:
+    def longest_standstill(self) -> float:
         """Return how long (s) samples may stand still: a block is output meanwhile."""
         if not self.settings["real_time"]:
             return float(self.settings["liveness_timeout_s"])
@@ -240,6 +237,10 @@ class ScanNode(Node, ABC):
         if self.ready != ready:
             self.ready = ready
             self.report()
+
+    def note_block(self, samples: int) -> None:
+        """Note the size of a block, for which samples stand still before they advance."""
+        self._longest_block = max(self._longest_block, samples * self.scan.sample_period)
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state and publish it."""
@@ -332,10 +333,20 @@ class ScanNode(Node, ABC):
         while not self._ended.wait(HEARTBEAT):
             self.report()
 
-    def _hear(self, message: Message) -> None:
+    def _hear(self, message: Message, _: int) -> None:
         if (m := message).node != self.get_name():
             now = time.monotonic()
             self.peers.hear(Report(m.node, m.scan_id, m.state, m.next_sample, m.reason, now))
+
+    def crowded(self) -> str:
+        """Return which topic has not the one publisher that it should have, if any."""
+        counts = {name: self.count_publishers(name) for name in self.inputs}
+        wrong = (
+            f"waits for one publisher of {name}, not {count}"
+            for name, count in counts.items()
+            if count != 1
+        )
+        return next(wrong, "")
 
     def pin_publishers(self) -> None:
         """Take the publishers that there are now as those of the scan."""

@@ -52,12 +52,12 @@ class ScanRecorder(BlockConsumer):
         for topic in (SCAN_INFO, MONITOR, *LINE_TOPICS, *topics):
             self._record(topic)
 
-    def receive_raw(self, topic: NodeTopic, name: str, data: bytes) -> None:
+    def receive_raw(self, topic: NodeTopic, name: str, data: bytes, number: int) -> None:
         """Write a message; follow its blocks like any consumer."""
         if self.leaving:
             return
         if topic.name in BLOCKS:
-            self.receive(topic, deserialize_message(data, topic.kind))
+            self.receive(topic, deserialize_message(data, topic.kind), number)
             self._recorded = True
         self._bag.write(name, time.time_ns(), data)
         self._received[topic.name] += 1

@@ -8,21 +8,18 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
-from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
-from afm_scan_ros.nodes.messages import MAX_BLOCK
 from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.peers import DONE
 from afm_scan_ros.nodes.run import IDLE
-from afm_scan_ros.nodes.topics import ACHIEVED, DONE, DRIVE, RUNNING, TRUE, NodeTopic
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
-LOOK = 0.02
-"""Seconds between two looks at the nodes upstream."""
 AHEAD = 0.05
 """Longest drive (s) given to the driver at once: it is output even if this process is gone."""
 
@@ -30,7 +27,7 @@ TIMEOUTS = (
     NodeParameter(
         "upstream_timeout_s",
         0.3,
-        "Time without a sign of an upstream node, or of this node, until the drive ramps down",
+        "Time without a sign of a node, or of this one, until the drive ramps down",
         low=0.2,
     ),
     NodeParameter(
@@ -58,7 +55,6 @@ class ScannerNode(ManagedConsumer):
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
-        self._next_look = 0.0
         self._asked = self._driving = 0.0
         self.read([DRIVE])
         self.autostart()
@@ -109,7 +105,6 @@ class ScannerNode(ManagedConsumer):
     def step(self) -> bool:
         """Keep the driver running while no error is found."""
         if self._is_open:
-            self._watch_upstream()
             self._driver.show_life()
         if self.is_active:
             self._publish_answer()
@@ -132,6 +127,11 @@ class ScannerNode(ManagedConsumer):
             "driver": self._choice.driver,
             "buffer_samples": waiting,
         }
+
+    def patience(self) -> float:
+        """Return how long (s) another node may be silent: the drive is not to wait for it."""
+        name = "upstream_timeout_s" if self.settings["real_time"] else "liveness_timeout_s"
+        return float(self.settings[name])
 
     def working_time(self) -> float:
         """Return how long the driver has worked (s)."""
@@ -166,21 +166,14 @@ class ScannerNode(ManagedConsumer):
         moved, self._moving = self._moving, []
         self._driving += time.monotonic() - self._asked
         self._move_on()
-        start = answer.measured.first_sample
-        for block, last in moved:
-            stop = min(end(block), end(answer.measured))
-            for first in range(start, stop, MAX_BLOCK):
-                until = min(first + MAX_BLOCK, stop)
-                self._send(answer, first, until, last=last and until == stop)
-            start = max(start, stop)
-            self.advance_to(end(block))
-            if last:
-                self.go(DONE)
-
-    def _send(self, answer: Displacement, start: int, stop: int, *, last: bool) -> None:
-        self.send(ACHIEVED, part(answer.measured, start, stop), last=last)
-        if answer.true is not None:
-            self.send(TRUE, part(answer.true, start, stop), last=last)
+        last = moved[-1][1]
+        for topic, displacement in ((ACHIEVED, answer.measured), (TRUE, answer.true)):
+            if displacement is not None:
+                for part in cut_as((block for block, _ in moved), displacement):
+                    self.send(topic, part, last=last and end(part) == end(displacement))
+        self.advance_to(end(moved[-1][0]))
+        if last:
+            self.go(DONE)
 
     def _check(self, info: ScanInfo) -> None:
         """Raise InputError where the settings contradict what is said of the scan."""
@@ -192,19 +185,3 @@ class ScannerNode(ManagedConsumer):
                 f" source says {info.sampling_instant}, {info.trigger_offset:g} s: give the source"
                 " the same sampling_instant and trigger_offset_s"
             )
-
-    def _watch_upstream(self) -> None:
-        """Raise ScanError where the drive must be ramped down."""
-        now = time.monotonic()
-        if self.state != RUNNING or now < self._next_look:
-            return
-        self._next_look = now + LOOK
-        if not self.settings["real_time"]:
-            if failure := self.peers.failure():
-                raise ScanError(failure)
-            return  # a node that computes is heard late: ``watch`` judges silence
-        nodes = self.scan.nodes
-        upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
-        timeout = self.settings["upstream_timeout_s"]
-        if trouble := self.peers.failure() or self.silence(upstream, now, timeout):
-            raise ScanError(trouble)

@@ -49,7 +49,7 @@ class TrackingMonitor(StreamReader):
             with suppress(RCLError):
                 self._viewers.publish(monitor_message(self.scan, sample))
 
-    def _hear_drive(self, message: ReceivedBlock) -> None:
+    def _hear_drive(self, message: ReceivedBlock, _: int) -> None:
         if self.info is None or self.leaving or message.scan_id != self.info.scan_id:
             return
         while self.prepares():

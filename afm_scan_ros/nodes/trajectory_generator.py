@@ -8,20 +8,13 @@ from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
-from afm_scan_ros.nodes.block_source import FLOW, BlockSource, taking_part
+from afm_scan_ros.nodes.block_source import BlockSource
+from afm_scan_ros.nodes.declare import scan_spec
+from afm_scan_ros.nodes.flow import FLOW, STOPPED, taking_part
 from afm_scan_ros.nodes.messages import Message
-from afm_scan_ros.nodes.parameters import (
-    MODEL_FILE,
-    NodeParameter,
-    inverses_of,
-    model_of,
-    scan_spec,
-)
+from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, model_of
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import DESIRED
-
-STOPPED = "stopped by request"
-"""Begins the reason of a scan that is done, though not whole."""
 
 
 class TrajectoryGenerator(BlockSource):

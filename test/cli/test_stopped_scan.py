@@ -4,8 +4,8 @@ import pytest
 
 from afm_scan_ros.cli import processes
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.nodes.flow import STOPPED
 from afm_scan_ros.nodes.together import Ended
-from afm_scan_ros.nodes.trajectory_generator import STOPPED
 
 
 def test_a_stopped_scan_is_incomplete_to_the_command(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.messages import MAX_BLOCK, BlockGuard
+from afm_scan_ros.core.streams import MAX_BLOCK
+from afm_scan_ros.nodes.messages import BlockGuard
 
 TOTAL = 60
 PERIOD = 1e-4

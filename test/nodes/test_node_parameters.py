@@ -10,13 +10,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.nodes import NODES
-from afm_scan_ros.nodes.parameters import (
-    NodeParameter,
-    declare,
-    inverses_of,
-    scan_spec,
-    scan_spec_parameters,
-)
+from afm_scan_ros.nodes.declare import declare, scan_spec
+from afm_scan_ros.nodes.parameters import NodeParameter, inverses_of, scan_spec_parameters
 from afm_scan_ros.nodes.scan_node import COMMON, ScanNode
 
 Start = Callable[..., ros.Node]

@@ -12,6 +12,7 @@ from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
@@ -113,8 +114,8 @@ def test_an_alarm_that_ends_is_told_too(
     monitor = ResidualMonitor()
     monitor.go(RUNNING)
     capfd.readouterr()
-    monitor.announce("x: far off", "x: far off")
-    monitor.announce("x: as before", "")
+    monitor.announce(ScanNews("x: far off", alarm=True))
+    monitor.announce(ScanNews("x: as before"))
     monitor.destroy_node()
     told = [line.split(" ", 3) for line in capfd.readouterr().err.splitlines()]
     assert [(level, news) for level, _, _, news in told] == [

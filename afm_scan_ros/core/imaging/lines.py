@@ -5,15 +5,16 @@ so tracking errors appear as distortion of the image.
 """
 
 from collections.abc import Iterator
+from typing import Protocol
 
 import numpy as np
 from attrs import define, field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import WholeLines
-from afm_scan_ros.core.trajectory import TO_AND_FRO
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, Aligner, WholeLines, end, part
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
+from afm_scan_ros.core.types import Array, Trace
 
 
 @frozen
@@ -114,3 +115,35 @@ class LineImager:
             pixel_means(position[: corner + 1], values[: corner + 1], self.frame),
             pixel_means(position[back], values[back], self.frame),
         )
+
+
+class Imaged(Protocol):
+    """What is imaged."""
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height (m) at positions (m), all (n,)."""
+        ...
+
+
+class ImageLines:
+    """Reads a sample's height at the achieved position and places it at the desired one.
+
+    The tip touches the sample on the lines alone.
+    """
+
+    def __init__(self, spec: ScanSpec, frame: Frame, sample: Imaged) -> None:
+        self._sample = sample
+        self._where = phases(spec).lines
+        self._imager = LineImager(spec, frame)
+        self._aligner = Aligner((DESIRED, ACHIEVED))
+
+    def add(self, name: str, block: Trace) -> Iterator[ImageLine]:
+        """Take a block of one of the two topics; yield the lines that it makes whole."""
+        self._aligner.add(name, block)
+        for run in self._aligner.ready():
+            start = max(self._where.start, run[0].first_sample)
+            stop = min(self._where.stop, end(run[0]))
+            if start < stop:
+                desired, achieved = (part(trace, start, stop) for trace in run)
+                heights = self._sample.height(achieved.x, achieved.y)
+                yield from self._imager.add(desired.x, heights)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.nodes.block_source import block_size_at
+from afm_scan_ros.nodes.flow import block_size_at
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 

@@ -25,7 +25,7 @@ from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model, model_hash
 from afm_scan_ros.files.plant_file import PARAMETERS, load_plant, load_scan
 from afm_scan_ros.files.records import to_mapping
-from afm_scan_ros.nodes.block_source import FLOW
+from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.scanner import Piezoscanner
 

@@ -7,11 +7,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.imaging.lines import frame_of
+from afm_scan_ros.core.imaging.lines import ImageLines, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.scan_imager import ImageLines
 from afm_scan_ros.simulation.sample import HeightMap
 
 SPEC = ScanSpec(
