@@ -84,6 +84,7 @@ class ScanNode(Node, ABC):
         self._readers: list[tuple[Subscription, Callable[[Message, Mapping[str, int]], None]]] = []
         self._publishers_of: dict[str, dict[bytes, str]] = {}
         self._longest_block = 0.0
+        self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
         )
