@@ -201,8 +201,8 @@ class ScanNode(Node, ABC):
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
         if trouble is None and self.info is not None and self.state == RUNNING:
-            own = self._own_report()
-            trouble = self.peers.standstill(own, self.info.window, now, self.longest_standstill())
+            limits = self.longest_standstill(), self._longest_pause()
+            trouble = self.peers.standstill(self._own_report(), self.info, now, *limits)
         if trouble:
             raise ScanError(trouble)
         self._watch_publishers()
@@ -217,6 +217,12 @@ class ScanNode(Node, ABC):
             return float(self.settings["liveness_timeout_s"])
         scale = max(1.0, self.settings["time_scale"])
         return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
+
+    def _longest_pause(self) -> float:
+        """Return how long (s) a node that works may seem to stand: a block, and two heartbeats."""
+        if not self.settings["real_time"]:
+            return 0.5 * self.longest_standstill()
+        return float(self.settings["time_scale"]) * self._longest_block + 2.0 * HEARTBEAT
 
     def _own_report(self) -> Report:
         name, now = self.get_name(), time.monotonic()
