@@ -27,6 +27,10 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
+NAMING = 0.2
+"""Longest time, s, in which the name of a publisher's node follows on the publisher."""
+_UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""What rmw calls a node until then."""
 
 COMMON = (
     NodeParameter(
@@ -83,6 +87,7 @@ class ScanNode(Node, ABC):
         self._heartbeat = Thread(target=self._beat, daemon=True)
         self._readers: list[tuple[Subscription, Callable[[Message, Mapping[str, int]], None]]] = []
         self._publishers_of: dict[str, dict[bytes, str]] = {}
+        self._crowded_since = 0.0
         self._longest_block = 0.0
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
@@ -205,7 +210,7 @@ class ScanNode(Node, ABC):
             trouble = self.peers.standstill(self._own_report(), self.info, now, *limits)
         if trouble:
             raise ScanError(trouble)
-        self._watch_publishers()
+        self._watch_publishers(now)
 
     def patience(self) -> float:
         """Return how long (s) another node may be silent."""
@@ -367,13 +372,15 @@ class ScanNode(Node, ABC):
         found = self.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True)
         return {bytes(each.endpoint_gid): each.node_name for each in found}
 
-    def _watch_publishers(self) -> None:
-        """Raise ScanError where a topic of the scan has got another publisher."""
+    def _watch_publishers(self, now: float) -> None:
+        """Raise ScanError where a topic of the scan has got another publisher, once it is named."""
         for topic, pinned in self._publishers_of.items():
             if self.count_publishers(topic) > len(pinned):
-                others = sorted({*self._gids(topic).values()} - {*pinned.values()})
-                named = f" ({', '.join(others)})" if others else ""
-                raise ScanError(f"{topic} has another publisher{named}: stop all but one")
+                self._crowded_since = self._crowded_since or now
+                others = sorted({*self._gids(topic).values()} - {*pinned.values(), _UNNAMED})
+                if others or now - self._crowded_since > NAMING:
+                    named = f" ({', '.join(others)})" if others else ""
+                    raise ScanError(f"{topic} has another publisher{named}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]

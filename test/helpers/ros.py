@@ -13,14 +13,14 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.nodes.topics import NodeTopic
 
-PATIENCE = 60.0
+PATIENCE = 30.0
 """Seconds after which a test has waited in vain."""
 
 
 @contextmanager
-def joined(**parameters: object) -> Iterator[None]:
-    """Join the domain with parameters for all nodes of this process."""
-    pairs = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
+def joined(*pairs: str, **parameters: object) -> Iterator[None]:
+    """Join the domain with parameters, NAME:=VALUE or named, for all nodes of this process."""
+    pairs += tuple(f"{name}:={json.dumps(value)}" for name, value in parameters.items())
     words = [word for pair in pairs for word in ("-p", pair)]
     rclpy.init(
         args=["test", "--ros-args", *words], signal_handler_options=SignalHandlerOptions.NO
