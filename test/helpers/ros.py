@@ -13,7 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.nodes.topics import NodeTopic
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 """Seconds after which a test has waited in vain."""
 
 

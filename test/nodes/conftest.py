@@ -22,6 +22,9 @@ SPEC = """\
     block_size: 500
     window: 5000
 """
+PATIENT = {"liveness_timeout_s": 5.0, "progress_timeout_s": 5.0}
+DRIVING = {"upstream_timeout_s": 5.0}
+"""Parameters of nodes, and of those that drive a scanner."""
 
 
 class WithoutRos(pytest.Module):
@@ -58,11 +61,15 @@ def spec(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., NodeProcess]]:
-    """Return a function that starts a node by name; it ends with the test."""
+    """Return a function that starts a node by name; it ends with the test.
+
+    Unless told otherwise it bears other work of the computer for seconds.
+    """
     started: list[NodeProcess] = []
 
     def run(name: str, file: Path | None = None, **given: object) -> NodeProcess:
-        started.append(NodeProcess.start(NodeCommand(name, given, file)))
+        patient = PATIENT | (DRIVING if name in ("piezoscanner_sim", "scanner_driver") else {})
+        started.append(NodeProcess.start(NodeCommand(name, patient | given, file)))
         return started[-1]
 
     yield run
