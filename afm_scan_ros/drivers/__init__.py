@@ -209,13 +209,14 @@ def driver_class(name: str) -> type[Driver]:
     known = f"give module:Class, or one of {', '.join(OURS)}"
     module, _, kind = OURS.get(name, name).partition(":")
     try:
-        found = getattr(import_module(module), kind, None)
+        file = getattr(there := import_module(module), "__file__", None)
+        found = getattr(there, kind, None)
     except ModuleNotFoundError as error:
         raise InputError(f"driver {name}: {error}; {_install(name, error) or known}") from error
     except (ImportError, ValueError) as error:
         raise InputError(f"driver {name}: {error}; {known}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):
-        raise InputError(f"driver {name}: {module} has no such driver; {known}")
+        raise InputError(f"driver {name}: {file or module} has no such driver; {known}")
     return found
 
 

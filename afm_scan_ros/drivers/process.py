@@ -86,7 +86,7 @@ class DriverHost:
         self._settings = from_mapping(ScannerSettings, asked["settings"], where)
         name = asked["driver"]
         if name not in OURS:
-            sys.path.append(os.getcwd())  # noqa: PTH109 - a module of the lab, and no other's name
+            sys.path.append(os.getcwd())  # noqa: PTH109 - last, so that it hides no module
         with refusing(f"driver {name}"), bounded("__init__", self._waits.opening):
             self._driver = GuardedDriver(name, self._settings, asked["options"], where)
         self._answer(Message(OPENED, {"knows_true": self._driver.knows_true}))

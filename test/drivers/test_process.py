@@ -7,6 +7,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice, client
+from afm_scan_ros.drivers.calls import take_priority
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import ENDING, DriverTimeouts, Link, Message, ramp_bound
 from afm_scan_ros.files import share_directory
@@ -323,7 +325,7 @@ def test_an_error_is_one_line_without_control_characters(
         ("simulated", {"seeds": 2}, "stage.yaml: options: unknown key 'seeds'; did you mean"),
         ("simulated", {"seed": 2.0}, r"stage.yaml: options: seed = 2.0 should be a whole number"),
         ("nowhere:Driver", {}, "driver nowhere:Driver: No module named 'nowhere'; give module"),
-        ("faulty", {}, "driver faulty: faulty has no such driver; give module:Class"),
+        ("faulty", {}, r"driver faulty: \S+/faulty\.py has no such driver; give module:Class"),
         ("faulty:SLOW", {}, "has no such driver"),
         ("faulty:NoCard", {}, "^driver faulty:NoCard: no card dev0$"),
         ("faulty:Wordless", {}, "^driver faulty:Wordless: ConnectionError$"),
@@ -429,3 +431,11 @@ def test_the_priority_is_as_it_is_said(opened: Open, tmp_path: Path, *, real_tim
     raised = os.sched_getscheduler(pid) == os.SCHED_FIFO
     assert driver.priority.startswith("real-time priority 10" if raised else "no real-time prio")
     assert real_time or not raised
+
+
+def test_a_priority_that_is_not_allowed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "sched_setscheduler", mock.Mock(side_effect=PermissionError(1, "denied")))
+        assert take_priority() == "no real-time priority: [Errno 1] denied"
+        patch.delattr(os, "sched_setscheduler")
+        assert "has no attribute 'sched_setscheduler'" in take_priority()
