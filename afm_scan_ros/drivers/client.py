@@ -44,8 +44,9 @@ class DriverProcess:
     One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
     process has a session of its own: a signal to the group of this one does not reach it.
     ``knows_true`` says whether each answer has a noise-free displacement. ``latency_samples`` is,
-    once it has started, how much later than its displacement it reads. After an error
-    ``outcome`` says why, and whether the outputs are at rest.
+    once it has started, how much later than its displacement it reads, and ``priority`` whether
+    its process has real-time priority, or why not. After an error ``outcome`` says why, and whether
+    the outputs are at rest.
     Raises InputError where the driver refuses its settings.
     """
 
@@ -54,14 +55,14 @@ class DriverProcess:
         self._waits, self._settings = waits, choice.settings
         self._asked = self._allowed = self._period = 0.0
         self._at_rest = True
-        self.latency_samples = 0
+        self.latency_samples, self.priority = 0, ""
         self.waiting = False
         self._block: Trace | None = None
         self._next_sign = 0.0
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-c", _RUN, str(theirs.fileno())],
+                [sys.executable, "-P", "-c", _RUN, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
@@ -105,6 +106,7 @@ class DriverProcess:
         self.waiting = False
         if (block := self._block) is None:
             self.latency_samples = message.fields["latency_samples"]
+            self.priority = message.fields["priority"]
             return None
         first, rows = message.fields["first_sample"], iter(message.samples)
         pairs = zip(rows, rows, strict=True)
@@ -124,10 +126,12 @@ class DriverProcess:
     def ramp_down(self, why: str) -> str:
         """Bring the outputs to rest, end the driver, and return why and how, within seconds.
 
-        Where the driver has ended already, that is what is returned.
+        A block that is late may be answered within ENDING, and the ramp begins then. Where the
+        driver has ended already, that is what is returned.
         """
         latency = self.latency_samples * self._period
-        deadline = time.monotonic() + ramp_bound(self._settings, latency)
+        return_of_block = ENDING if self.waiting and self._block else 0.0
+        deadline = time.monotonic() + return_of_block + ramp_bound(self._settings, latency)
         with suppress(InputError, ScanError):
             self._send(Message(STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
@@ -199,8 +203,9 @@ class DriverProcess:
         if said["bad_input"] and self._block is None:
             self.outcome = reason
             raise InputError(reason)
-        if ramp is None:
-            self._end(f"{reason}; the ramp-down failed: the drive may not be at rest")
+        if isinstance(ramp, str):
+            self._at_rest = False
+            self._end(f"{reason}; {ramp}: the drive may not be at rest")
         self._at_rest = True
         moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._block else ""
         self._end(f"{reason}{moved}")

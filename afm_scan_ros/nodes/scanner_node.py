@@ -69,8 +69,8 @@ class ScannerNode(ManagedConsumer):
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
         real, simulated = (
-            DriverTimeouts(upstream, opening, upstream),
-            DriverTimeouts(liveness, opening, opening),
+            DriverTimeouts(upstream, upstream, opening, upstream, real_time=True),
+            DriverTimeouts(liveness, opening, opening, opening, real_time=False),
         )
         self._driver = DriverProcess(self._choice, real if given["real_time"] else simulated)
         self._is_open = True

@@ -116,7 +116,7 @@ def fork(
     theirs, ours = os.pipe()
     files = {0: theirs, 1: standard[0], 2: standard[1], **{each: each for each in pass_fds}}
     sent = {number: _Sent(file) for number, file in files.items()}
-    process = _Node(target=_run, args=(args[2:], Path.cwd(), dict(os.environ), sent))
+    process = _Node(target=_run, args=(_after_c(args), Path.cwd(), dict(os.environ), sent))
     with mock.patch.dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)):
         process.start()  # the first starts the server, which finds there what it imports
     os.close(theirs)
@@ -124,6 +124,11 @@ def fork(
     if stdin != subprocess.PIPE:
         process.stdin.close()
     return process
+
+
+def _after_c(args: Sequence[str]) -> Sequence[str]:
+    """Return the code of ``python -c``, whatever options are before it, and its arguments."""
+    return args[args.index("-c") + 1 :]
 
 
 def _run(
@@ -163,7 +168,7 @@ def _fork_driver() -> None:
     def start(args: Sequence[str], *, pass_fds: Sequence[int], **_: object) -> ForkedProcess:
         client.subprocess = subprocess  # type: ignore[attr-defined]
         with ours:
-            socket.send_fds(ours, [json.dumps([*args[2:], *pass_fds]).encode()], pass_fds)
+            socket.send_fds(ours, [json.dumps([*_after_c(args), *pass_fds]).encode()], pass_fds)
         return process
 
     process = _Driver(target=_await_request, args=(theirs, ours), daemon=True)
