@@ -126,6 +126,8 @@ class Peers:
             culprit = source
         else:
             culprit = max(still, key=lambda each: _lag(each, reports))
+        if culprit.node != own.node and (silent := now - culprit.heard) > 0.5 * timeout:
+            return f"{culprit.node} has been silent for {silent:.2g} s"
         reason = f" ({culprit.reason})" if culprit.reason else ""
         return (
             f"{culprit.node} has finished no sample for {timeout:.3g} s: it stands at sample"

@@ -129,7 +129,7 @@ class ScannerNode(ManagedConsumer):
         }
 
     def patience(self) -> float:
-        """Return how long (s) another node may be silent: the drive is not to wait for it."""
+        """Return how long (s) another node may be silent while the drive is up."""
         name = "upstream_timeout_s" if self.settings["real_time"] else "liveness_timeout_s"
         return float(self.settings[name])
 

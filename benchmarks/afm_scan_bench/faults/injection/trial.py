@@ -6,22 +6,21 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import rclpy
 from attrs import frozen
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
-from afm_scan_ros.cli.processes import isolate
+import os
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING
-from afm_scan_ros.ros import (
-    Message,
-    Node,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
-    shutdown,
-)
+from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import NODE_STATE
 
 PATIENCE = 60.0
 """Longest wait, s, for what a trial waits for: a hang, if it takes longer."""
@@ -92,8 +91,9 @@ class Trial:
 
     def __enter__(self) -> Self:
         self.folder.mkdir()
-        isolate()
-        init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE","LOCALHOST")
+        middleware.prepare()
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._listener = Listener()
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._listener)
@@ -109,7 +109,7 @@ class Trial:
             node.process.kill()
             node.process.join()
         self._executor.shutdown()
-        shutdown()
+        rclpy.shutdown()
 
     @property
     def heard(self) -> list[Heard]:
