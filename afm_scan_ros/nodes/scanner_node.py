@@ -74,7 +74,8 @@ class ScannerNode(ManagedConsumer):
             DriverTimeouts(upstream, opening, upstream),
             DriverTimeouts(liveness, opening, opening),
         )
-        self._driver = DriverProcess(self._choice, real if given["real_time"] else simulated)
+        waits = real if given["real_time"] else simulated
+        self._driver = DriverProcess(self._choice, waits).opened()
         self._is_open = True
         if self._driver.knows_true:  # before the other, whose readers then know of this one
             self.write(TRUE, given["min_true_subscriptions"])
@@ -92,7 +93,7 @@ class ScannerNode(ManagedConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Let the driver start; raises InputError where the scan does not fit its settings."""
-        self._check(info)
+        self._choice.refuse_other_instant(info.sampling_instant, info.trigger_offset)
         self._driver.start(info.sample_period)
         while self._driver.waiting:
             yield "waits for the driver to start"
@@ -172,17 +173,6 @@ class ScannerNode(ManagedConsumer):
         self.advance_to(end(moved[-1][0]))
         if last:
             self.go(DONE)
-
-    def _check(self, info: ScanInfo) -> None:
-        """Raise InputError where the settings contradict what is said of the scan."""
-        settings, where = self._choice.settings, self._choice.where
-        own = settings.sampling_instant, settings.trigger_offset
-        if own != (info.sampling_instant, info.trigger_offset):
-            raise InputError(
-                f"{where}: samples are taken {own[0]}, with an offset of {own[1]:g} s, but the"
-                f" source says {info.sampling_instant}, {info.trigger_offset:g} s: give the source"
-                " the same sampling_instant and trigger_offset_s"
-            )
 
     def _watch_upstream(self) -> None:
         """Raise ScanError where the drive must be ramped down."""

@@ -12,7 +12,8 @@ import pytest
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.types import AXES
