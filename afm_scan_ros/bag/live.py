@@ -99,4 +99,4 @@ class LiveRecorder:
                 self._bag.add_line("model_residual", found)
             elif not found.expected and found.text != self._said:
                 self._said = found.text
-                self._listener.say(found.text)
+                self._listener.say(f"residual_monitor: {found.text}")

@@ -207,8 +207,8 @@ def _run_processes(
             _wait(running, idle)
         finally:
             stuck = _end(running)
-        _raise_failure([node.ended() for node in running if node not in stuck], names)
-        _raise_failure([node.ended() for node in stuck], names)
+        raise_failure([node.ended() for node in running if node not in stuck], names)
+        raise_failure([node.ended() for node in stuck], names)
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
@@ -236,7 +236,7 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
     return alive
 
 
-def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
+def raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     """Raise the error of the nodes that failed by themselves, not because another did.
 
     Its notes are their tracebacks, if any. A scan that was stopped on request is incomplete, though

@@ -11,7 +11,7 @@ from afm_scan_ros.nodes import has_rclpy, lacking_ros
 
 def scan_as_ordered(order: ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
-    if _nodes_can_run():
+    if nodes_can_run():
         from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
 
         by_nodes.scan(order)
@@ -21,7 +21,7 @@ def scan_as_ordered(order: ScanOrder) -> None:
 
 def record_as_ordered(order: RecordOrder) -> None:
     """Record; raises as ``scan_as_ordered`` does."""
-    if _nodes_can_run():
+    if nodes_can_run():
         from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
 
         by_nodes.record(order)
@@ -30,7 +30,7 @@ def record_as_ordered(order: RecordOrder) -> None:
 
 
 @cache
-def _nodes_can_run() -> bool:
+def nodes_can_run() -> bool:
     """Return whether nodes can run; a ROS without this package's messages is told of once."""
     lacking = lacking_ros()
     if lacking and has_rclpy():
