@@ -1,10 +1,7 @@
 """No test sees the user's ROS domain, or what another test set; no test asserts time."""
 
-import multiprocessing
 import os
-import sys
 from collections.abc import Iterator
-from importlib.util import find_spec
 from unittest import mock
 
 import pytest
@@ -58,23 +55,3 @@ def _environment() -> Iterator[None]:
         for name in OF_THE_USER:
             os.environ.pop(name, None)
         yield
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _forked_nodes() -> Iterator[None]:
-    """Fork processes of nodes and drivers from one that has imported what they import."""
-    if sys.platform != "linux" or find_spec("rclpy") or not find_spec("cyclonedds"):
-        yield
-        return
-    from afm_scan_ros.cli import processes  # noqa: PLC0415 - slow to import
-    from afm_scan_ros.drivers import client  # noqa: PLC0415 - as above
-    from helpers import fork_server  # noqa: PLC0415 - of the tests' folder
-
-    forking = fork_server.forking(fork_server.fork)
-    with (
-        mock.patch.object(processes, "subprocess", forking),
-        mock.patch.object(client, "subprocess", forking),
-    ):
-        yield
-    for process in multiprocessing.active_children():
-        process.kill()  # or the tests' process would wait for it

@@ -13,7 +13,8 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
-from afm_scan_ros.cli.scan import ScanFiles, drive_limits_of, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import drive_limits_of, run_scan
 from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of

@@ -4,6 +4,7 @@ A driver has settings; drive goes in, readings come out, and it can ramp to rest
 """
 
 import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from importlib import import_module
@@ -100,6 +101,16 @@ class DriverChoice:
     settings: ScannerSettings
     options: dict[str, Any]
     where: str
+
+    def refuse_other_instant(self, instant: str, offset: float) -> None:
+        """Raise InputError where the source of a scan states another instant or offset (s)."""
+        own = self.settings.sampling_instant, self.settings.trigger_offset
+        if own != (instant, offset):
+            raise InputError(
+                f"{self.where}: samples are taken {own[0]}, with an offset of {own[1]:g} s, but the"
+                f" source says {instant}, {offset:g} s: give the source the same sampling_instant"
+                " and trigger_offset_s"
+            )
 
 
 def load_settings(driver: str, path: Path) -> DriverChoice:
@@ -202,11 +213,13 @@ class Driver(ABC):
 
 
 def driver_class(name: str) -> type[Driver]:
-    """Return the driver of a short name or of ``module:Class``.
+    """Return the driver of a short name or of ``module:Class``, also one in the current folder.
 
     Raises InputError where there is none.
     """
     known = f"give module:Class, or one of {', '.join(OURS)}"
+    if name not in OURS:
+        sys.path.append(str(Path.cwd()))
     module, _, kind = OURS.get(name, name).partition(":")
     try:
         file = getattr(there := import_module(module), "__file__", None)

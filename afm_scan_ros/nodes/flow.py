@@ -1,5 +1,7 @@
 """How a scan flows from its source: blocks, window, pace; needs no ROS."""
 
+import time
+from datetime import UTC, datetime
 from math import ceil
 
 from afm_scan_ros.core.streams import MAX_BLOCK
@@ -51,6 +53,13 @@ FLOW = (
 def block_size_at(sample_period: float) -> int:
     """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
     return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
+
+
+def identity(scan_id: str) -> tuple[str, int]:
+    """Return a scan's id, by default its start time, and the time, ns, at which it begins."""
+    start = time.time_ns()
+    moment = datetime.fromtimestamp(start / 1e9, UTC)
+    return scan_id or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
 
 
 def taking_part(*nodes: str) -> NodeParameter:

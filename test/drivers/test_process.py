@@ -64,7 +64,7 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
         options = {"plant_file": str(PLANT), "seed": 1, "output_log": str(tmp_path / "outputs.txt")}
         choice = DriverChoice(driver, METRES, options | given, "stage.yaml")
         waits = DriverTimeouts(silence, starved, opening, answer, real_time)
-        drivers.append(DriverProcess(choice, waits))
+        drivers.append(DriverProcess(choice, waits).opened())
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None
         assert not drivers[-1].waiting

@@ -10,8 +10,9 @@ from attrs import evolve
 from afm_scan_ros import ros
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model

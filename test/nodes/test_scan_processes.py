@@ -13,8 +13,9 @@ from afm_scan_ros import ros
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import options
 from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE

@@ -241,11 +241,9 @@ class RaisingWatchdog(FaultyScanner):
 def faulty_node(name: str, log: str) -> int:
     """Run the scanner's node with a fault in it; return its status."""
     fault = BY_NAME[name]
-    if fault.driver:
-        piezoscanner_sim.DRIVER = f"{__name__}:{fault.driver}"
     if fault.method and fault.to == "node":
         _break(piezoscanner_sim.PiezoscannerSim, fault.method, fault.act, log)
-    watch_the_sensor()
+    watch_the_sensor(f"{__name__}:{fault.driver}" if fault.driver else "")
     return run_node(piezoscanner_sim.PiezoscannerSim.NAME)
 
 
@@ -257,8 +255,8 @@ def faulty_neighbour(name: str, log: str) -> int:
     return run_node(kind.NAME)
 
 
-def watch_the_sensor() -> None:
-    """Check the readings of the simulated sensor, as those of a real one."""
+def watch_the_sensor(driver: str = "") -> None:
+    """Check the readings of the simulated sensor, as those of a real one, by another ``driver``."""
     kind = piezoscanner_sim.PiezoscannerSim
     whole = kind.choice
 
@@ -271,7 +269,7 @@ def watch_the_sensor() -> None:
             response_time=RESPONSE,
             drive_resolution=RESOLUTION,
         )
-        return evolve(given, settings=watched)
+        return evolve(given, settings=watched, driver=driver or given.driver)
 
     setattr(kind, "choice", choice)  # noqa: B010 - no method, to the type checker
 
