@@ -99,7 +99,7 @@ class ScannerNode(ManagedConsumer):
         while self._driver.waiting:
             yield "waits for the driver to start"
             self._driver.answer(IDLE)
-        self.get_logger().info(f"the driver's process has {self._driver.priority}")
+        self.get_logger().info(f"driver: {self._driver.priority}")
         if 2 * (late := self._driver.latency_samples) > info.window:
             raise InputError(
                 f"{self._choice.where}: latency_samples = {late}, with the driver's buffer, is over"

@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.faults import Announce
+from afm_scan_bench.faults.injection import viewer
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
 import os
@@ -130,6 +131,11 @@ class Trial:
         bag = {"bag": str(self.folder / name)} if kind == "scan_recorder" else {}
         output = self.folder / f"{len(self._started)}_{name}.txt"
         self._started.append(Forked.start(kind, bag, output, name=name))
+        return self._started[-1]
+
+    def start_viewer(self) -> Forked:
+        """Start a viewer, which has no part in the scan."""
+        self._started.append(viewer.start(self.folder / "viewer.txt"))
         return self._started[-1]
 
     def listen(self, seconds: float) -> None:
