@@ -179,4 +179,3 @@ class ScannerNode(ManagedConsumer):
         self.advance_to(end(moved[-1][0]))
         if last:
             self.go(DONE)
-

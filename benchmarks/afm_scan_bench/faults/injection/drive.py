@@ -139,7 +139,7 @@ class FaultyProcesses:
         if fault.viewer:
             (profile := folder / "blocking.xml").write_text(BLOCKING, "utf-8")
             blocks = {
-                "FASTDDS_DEFAULT_PROFILES_FILE": str(profile),
+                "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
                 "RMW_FASTRTPS_USE_QOS_FROM_XML": "1",
             }
         node = _started("faulty_node", fault, log, given, blocks)

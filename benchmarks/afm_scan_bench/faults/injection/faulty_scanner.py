@@ -58,10 +58,9 @@ def note(log: object) -> None:
 class Fault:
     """A fault; ``message`` is in the scan's nodes' reports of it.
 
-    From FAULT_AT on, ``method`` of the scanner's node, or of the recorder where ``to`` says so, does
-    ``act`` in place of its work, or the driver ``driver`` of this module fails; or the bench sends
-    ``number`` to ``to``, or blocks publish by a ``viewer`` that it stops, or publishes ``forged``
-    drive.
+    From FAULT_AT on, ``method`` of the scanner's node, or of ``to``, does ``act`` in place of its
+    work, or the driver ``driver`` of this module fails; or the bench sends ``number`` to ``to``,
+    or blocks publish by a ``viewer`` that it stops, or publishes ``forged`` drive.
     """
 
     name: str

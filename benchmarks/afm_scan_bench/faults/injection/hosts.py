@@ -113,11 +113,9 @@ def host_environment(name: str) -> dict[str, str]:
     profile.write_text(PROFILE, "utf-8")
     return {
         **os.environ,
-        "FASTDDS_DEFAULT_PROFILES_FILE": str(profile),
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-        "ROS_STATIC_PEERS": ";".join(
-            each for each in ADDRESSES.values() if each != ADDRESSES[name]
-        ),
+        "ROS_STATIC_PEERS": ";".join({*ADDRESSES.values()} - {ADDRESSES[name]}),
         "ROS_DOMAIN_ID": "0",
     }
 

@@ -16,7 +16,7 @@ from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection import viewer
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
-import os
+from afm_scan_ros.cli.processes import isolate
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.messages import Message
@@ -92,7 +92,7 @@ class Trial:
 
     def __enter__(self) -> Self:
         self.folder.mkdir()
-        os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE","LOCALHOST")
+        isolate()
         middleware.prepare()
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._listener = Listener()
