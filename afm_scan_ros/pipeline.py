@@ -49,7 +49,7 @@ UNWRITTEN = 500
 
 
 @frozen(eq=False)
-class Chain:
+class ScanChain:
     """What a scan runs through.
 
     ``block`` is the source: it computes samples of the desired displacement (m), or of the drive
@@ -70,7 +70,7 @@ class Chain:
     monitor: ScanMonitor | None = None
 
 
-def run(chain: Chain, bag: Path, listener: ScanListener) -> None:
+def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
     """Run a scan, and record it in a bag.
 
     Raises InputError before it begins, ScanError where it stays incomplete, and KeyboardInterrupt
@@ -108,7 +108,7 @@ def _timeouts(time_scale: float) -> DriverTimeouts:
     return DriverTimeouts(HELD, HELD * max(1.0, time_scale), OPENING, HELD, real_time=True)
 
 
-def _prepare(chain: Chain, driver: DriverProcess, listener: ScanListener) -> None:
+def _prepare(chain: ScanChain, driver: DriverProcess, listener: ScanListener) -> None:
     """Let the driver start, and check the scan meanwhile."""
     with _part(chain.scanner):
         chain.driver.refuse_other_instant(chain.info.sampling_instant, chain.info.trigger_offset)
@@ -126,7 +126,7 @@ def _prepare(chain: Chain, driver: DriverProcess, listener: ScanListener) -> Non
 class _Flow:
     """The blocks on their way; what becomes of them follows from those before, from no timing."""
 
-    _chain: Chain
+    _chain: ScanChain
     _driver: DriverProcess
     _pool: ThreadPoolExecutor
     _recorder: LiveRecorder
@@ -258,7 +258,7 @@ def _part(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def _ramping_down(chain: Chain, driver: DriverProcess) -> Iterator[None]:
+def _ramping_down(chain: ScanChain, driver: DriverProcess) -> Iterator[None]:
     """Bring the outputs to rest after whatever ends the work early, and say so."""
     try:
         yield

@@ -27,7 +27,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.nodes.parameters import SIMULATION, simulated_scanner
-from afm_scan_ros.pipeline import Chain, run
+from afm_scan_ros.pipeline import ScanChain, run
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import ALL, default_model, default_plant
 
@@ -117,8 +117,8 @@ def plainly(spec: ScanSpec, size: int, given: InversionSettings) -> dict[str, li
     return done
 
 
-def chain(spec: ScanSpec, size: int, given: InversionSettings, window: int = 0) -> Chain:
-    return Chain(
+def chain(spec: ScanSpec, size: int, given: InversionSettings, window: int = 0) -> ScanChain:
+    return ScanChain(
         evolve(info_of_scan(spec, "one", 10**18), window=window or 20 * size),
         partial(desired, spec),
         size,

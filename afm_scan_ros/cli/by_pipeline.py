@@ -38,7 +38,7 @@ from afm_scan_ros.nodes.parameters import (
     inversion_settings,
     simulated_scanner,
 )
-from afm_scan_ros.pipeline import Chain, run
+from afm_scan_ros.pipeline import ScanChain, run
 
 
 def scan(order: ScanOrder) -> None:
@@ -53,7 +53,7 @@ def scan(order: ScanOrder) -> None:
         model_hash=model_hash(order.model),
     )
     learned = load_learned(files.learned).correction if files.learned else None
-    chain = Chain(
+    chain = ScanChain(
         block=partial(desired, spec),
         driver=_driver(order.scanner, order.own.get(order.scanner.node, {})),
         scanner=order.scanner.node,
@@ -72,7 +72,7 @@ def record(order: RecordOrder) -> None:
     """Drive the scanner through a plan; raises as ``scan`` does."""
     plan, flow = order.plan, _flow(order.scanner.source, order.plan.name)
     info = ScanInfo(*identity(""), plan.name, plan.sample_period, plan.total_samples)
-    chain = Chain(
+    chain = ScanChain(
         block=partial(excitation_block, plan),
         driver=_driver(order.scanner, order.own),
         scanner=order.scanner.node,

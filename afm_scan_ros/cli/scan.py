@@ -44,8 +44,8 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.flow import FLOW
-from afm_scan_ros.nodes.parameters import inverses_of
+from afm_scan_ros.nodes.flow import FLOW, TIME_SCALE
+from afm_scan_ros.nodes.parameters import checked, inverses_of
 
 
 class Online(TypedDict, total=False):
@@ -79,7 +79,8 @@ def run_scan(
     inverses_of(inverses, INVERSES)
     spec, flow = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
-        time_scale = float(flow.get("time_scale", pace_of(files.scanner)))
+        given = {"time_scale": pace_of(files.scanner), **flow}
+        time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
     refuse_pace(time_scale)
     corrected = {name: online.get(name) is True for name in ("line_feedback", "adapt")}
     _refuse_unsuited(spec, files.scanner, corrected)

@@ -20,6 +20,9 @@ LEAST_BLOCK = 100
 USUAL_WINDOW = 20
 """Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
 
+TIME_SCALE = NodeParameter(
+    "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
+)
 FLOW = (
     NodeParameter(
         "block_size",
@@ -35,9 +38,7 @@ FLOW = (
         f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
         low=0,
     ),
-    NodeParameter(
-        "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
-    ),
+    TIME_SCALE,
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
     NodeParameter(

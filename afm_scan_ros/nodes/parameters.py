@@ -181,19 +181,20 @@ def scan_spec_parameters() -> list[NodeParameter]:
     return [_for_people(attribute) for attribute in scan_parameters()]
 
 
-def checked(parameter: NodeParameter, given: Mapping[str, Any], where: str) -> Value:
+def checked(parameter: NodeParameter, given: Mapping[str, Any], where: str) -> Any:  # noqa: ANN401 - of the default's type
     """Return a parameter's value; raises InputError, naming ``where``, where it does not fit."""
     value: Any = given.get(parameter.name, parameter.default)
     at = f"{where}: {parameter.name}"
-    if parameter.name in given:
-        value = converted(type(parameter.default), value, 1.0, at)
+    if isinstance(parameter.default, float) and type(value) is int:
+        value = float(value)
+    value = converted(type(parameter.default), value, 1.0, at)
     if parameter.choices and value not in parameter.choices:
         raise InputError(f"{at} = '{value}' is not one of {', '.join(parameter.choices)}")
     if parameter.low is not None and value < parameter.low:
         raise InputError(f"{at} = {value:g} is below {parameter.low:g}: give more")
     if parameter.high is not None and value > parameter.high:
         raise InputError(f"{at} = {value:g} is above {parameter.high:g}: give less")
-    return value  # type: ignore[no-any-return] # of the default's type
+    return value
 
 
 def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:

@@ -27,6 +27,7 @@ from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import yaml
+from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant, drive_through
 from helpers.stage import stage
 
@@ -193,6 +194,16 @@ def test_a_drive_that_may_be_up_is_told(
         yaml.save(Path(path), {**yaml.load(Path(path)), "x": metres, "y": metres}, "Metres.")
     with pytest.raises(ScanError, match=rf"^scanner_driver: .*{said}"):
         run_scan(files(spec, scanner), ("none",), pace)
+
+
+def test_late_readings_are_dated_back(spec: Path, faulty: Callable[..., str]) -> None:
+    run_scan(files(spec, faulty("Late", latency=7)), ("none",), 0.0)
+    bag = read_scan(spec.parent / "bag")
+    assert bag.warnings == ()
+    drive, measured = (bag.whole(n) for n in ("drive_voltage", "achieved_displacement"))
+    alone, _ = Piezoscanner(default_plant(), drive.sample_period, seed=1).advance(drive)
+    for axis in AXES:
+        np.testing.assert_allclose(measured.axis(axis), alone.axis(axis), rtol=1e-12, atol=1e-18)
 
 
 def test_readings_that_never_come_are_told(spec: Path, faulty: Callable[..., str]) -> None:

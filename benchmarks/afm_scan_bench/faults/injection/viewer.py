@@ -5,21 +5,19 @@ import signal
 import time
 from pathlib import Path
 
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
 from afm_scan_bench.faults.injection.processes import FORKING, Forked
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import (
     BLOCKS,
     MODEL_RESIDUAL,
     NODE_STATE,
     SCAN_INFO,
     TRACKING_ERROR,
-)
-from afm_scan_ros.ros import (
-    Message,
-    Node,
-    QoSProfile,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
 )
 
 TOPICS = (*BLOCKS.values(), TRACKING_ERROR, MODEL_RESIDUAL, NODE_STATE, SCAN_INFO)
@@ -58,7 +56,5 @@ def start(output: Path) -> Forked:
 def _view(environment: dict[str, str], output: Path) -> None:
     os.environ.update(environment)
     os.dup2(os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
-    init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    executor = SingleThreadedExecutor()
-    executor.add_node(Viewer())
-    executor.spin()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.spin(Viewer())
