@@ -16,7 +16,7 @@ CORE_MODULES = [
     for path in sorted((PACKAGE / "core").rglob("*.py"))
 ]
 
-ABOVE = ("api", "cli", "report")  # what stands on all the others
+ABOVE = ("api", "cli", "pipeline", "report")  # what stands on all the others
 # Folder: what nothing in it imports.
 NEVER = {
     "core": (*ABOVE, "bag", "drivers", "files", "nodes", "ros", "simulation"),
@@ -26,8 +26,8 @@ NEVER = {
     "drivers": (*ABOVE, "bag", "nodes", "ros"),
     "nodes": ABOVE,
     "ros": (*ABOVE, "bag", "drivers", "nodes", "simulation"),
-    "report": ("api", "cli"),
-    "api": ("cli", "nodes", "ros", "simulation"),
+    "report": ("api", "cli", "pipeline"),
+    "api": ("cli", "nodes", "pipeline", "ros", "simulation"),
 }
 SIMULATION_MAY = {"types", "errors", "compiled", "limits"}
 
@@ -61,9 +61,14 @@ def test_the_plant_shares_no_physics_with_the_model() -> None:
         assert core <= SIMULATION_MAY, path.name
 
 
-def test_only_ros_names_the_middleware() -> None:
+NEED_ROS = {"cli/by_nodes.py", "cli/external.py", "cli/watch.py"}
+"""Modules beside the nodes that are imported only where ROS is."""
+
+
+def test_only_nodes_and_what_listens_to_them_name_the_middleware() -> None:
     for path, names in imports_of(PACKAGE).items():
-        inside = path.relative_to(PACKAGE).parts[0] == "ros"
+        place = path.relative_to(PACKAGE)
+        inside = place.parts[0] in ("nodes", "ros") or place.as_posix() in NEED_ROS
         named = {name.split(".")[0] for name in names} & {"rclpy", "cyclonedds"}
         assert inside or not named, f"{path.name} imports {named}"
 
@@ -97,9 +102,12 @@ def module_of(name: str, known: Container[str]) -> str:
     return name if name in known else next((n for n in [name.rpartition(".")[0]] if n in known), "")
 
 
-def test_core_needs_no_middleware() -> None:
-    block = "import sys, importlib; sys.modules['rclpy'] = sys.modules['cyclonedds'] = None\n"
-    code = block + f"for name in {CORE_MODULES!r}: importlib.import_module(name)"
+def test_core_and_the_commands_need_no_middleware() -> None:
+    commands = [p for p in (PACKAGE / "cli").glob("*.py") if f"cli/{p.name}" not in NEED_ROS]
+    names = [*CORE_MODULES, "afm_scan_ros.pipeline", *(module_name(path) for path in commands)]
+    hidden = "for name in ('rclpy', 'cyclonedds', 'afm_scan_ros.msg', 'afm_scan_ros.ros'):"
+    block = f"import sys, importlib\n{hidden} sys.modules[name] = None\n"
+    code = block + f"for name in {names!r}: importlib.import_module(name)"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
 
 

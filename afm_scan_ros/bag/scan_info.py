@@ -18,6 +18,7 @@ from afm_scan_ros.bag.typestore import (
 )
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec, scan_parameters
+from afm_scan_ros.core.streams import LineError, MonitorSample
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Trace
 
@@ -115,6 +116,25 @@ STREAMS = {
     "achieved_displacement": DISPLACEMENT,
     "true_displacement": DISPLACEMENT,
 }
+
+
+LINE_FIGURES = ("tracking_error", "model_residual")
+"""Topics with the figures of each line."""
+MONITOR = "monitor"
+"""Topic with single samples."""
+LINE, SAMPLE = f"{PACKAGE}/TrackingError", f"{PACKAGE}/MonitorSample"
+
+
+def encode_line(info: ScanInfo, figures: LineError) -> bytes:
+    """CDR of the ``TrackingError`` message of one line."""
+    fields = asdict(figures, filter=lambda a, _: a.name != "first_sample")
+    return encode(LINE, info.stamp(figures.first_sample), {"scan_id": info.scan_id, **fields})
+
+
+def encode_sample(info: ScanInfo, sample: MonitorSample) -> bytes:
+    """CDR of the ``MonitorSample`` message."""
+    fields = {"scan_id": info.scan_id, **asdict(sample)}
+    return encode(SAMPLE, info.stamp(sample.sample), fields)
 
 
 @frozen(eq=False)

@@ -207,22 +207,26 @@ class BagWriter:
 
 
 class ScanWriter(BagWriter):
-    """A bag with one scan. Raises InputError where the folder exists."""
+    """A bag with one scan, of these ``streams``. Raises InputError where the folder exists."""
 
-    def __init__(self, folder: Path, info: ScanInfo) -> None:
+    def __init__(self, folder: Path, info: ScanInfo, streams: Iterable[str] = STREAMS) -> None:
         super().__init__(folder)
         self._info = info
         self.add_topic("/scan_info", SCAN_INFO, latched=True)
-        for name, type_name in STREAMS.items():
-            self.add_topic(f"/{name}", type_name)
-        self.write("/scan_info", info.start, encode_info(info))
+        for name in streams:
+            self.add_topic(f"/{name}", STREAMS[name])
+        self.put("scan_info", 0, encode_info(info))
         self.flush()  # without it the rest would mean nothing
 
     def add(self, name: str, trace: Trace) -> None:
         """Append the next samples of a stream, as ``desired_displacement``."""
         last = end(trace) == self._info.total_samples
         cdr = encode_block(STREAMS[name], self._info, trace, last=last)
-        self.write(f"/{name}", self._info.stamp(trace.first_sample), cdr)
+        self.put(name, trace.first_sample, cdr)
+
+    def put(self, name: str, sample: int, cdr: bytes) -> None:
+        """Append a message at the moment of its first sample."""
+        self.write(f"/{name}", self._info.stamp(sample), cdr)
 
 
 def write_record(bag: Path, info: ScanInfo, streams: dict[str, Trace]) -> None:

@@ -1,4 +1,4 @@
-"""``afm-scan demo``: the whole chain as separate processes, without and with compensation."""
+"""``afm-scan demo``: the whole chain, without and with compensation."""
 
 import shutil
 from collections.abc import Iterator
@@ -8,7 +8,8 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import CONFIG, FOLDER
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.plant_file import save_scan

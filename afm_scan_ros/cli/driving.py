@@ -1,27 +1,27 @@
 """Drives the scanner of the option --scanner through plans, also grown while they are watched."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import click
-from attrs import evolve, field, frozen
+from attrs import field, frozen
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import refuse_existing
+from afm_scan_ros.cli.orders import RecordOrder, refuse_pace
 from afm_scan_ros.cli.plan import covered
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
+from afm_scan_ros.cli.processes import set_aside
 from afm_scan_ros.cli.scanner import (
     PLANT,
     SIM,
-    ScannerChoice,
     amplifier_of,
     choose,
     exchange_of,
     pace_of,
     record_by_files,
 )
+from afm_scan_ros.cli.ways import record_as_ordered
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import peak
@@ -36,7 +36,6 @@ from afm_scan_ros.core.identification.drives.proposal import (
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.files.drive_files import save_drive
 from afm_scan_ros.report.plan_text import (
     growth_row,
     growth_table,
@@ -75,30 +74,14 @@ class DrivenScanner:
         if exchange := exchange_of(self.scanner):
             record_by_files(exchange, plan, bag)
             return
+        time_scale = pace_of(self.scanner) if self.time_scale is None else self.time_scale
+        refuse_pace(time_scale)
         chosen = choose(self.scanner, self.plant)
         if chosen.limits is not None:
             drive = excitation_block(plan, 0, plan.total_samples)
             chosen.limits.refuse_beyond(drive, dict.fromkeys(AXES, 0.0))
-        with TemporaryDirectory() as folder, watching(f"{title}, to {bag}") as idle:
-            commands = self._commands(chosen, save_drive(Path(folder), plan), bag)
-            run_nodes(commands, idle, [chosen.node])
-
-    def _commands(self, chosen: ScannerChoice, drive_file: Path, bag: Path) -> list[NodeCommand]:
-        time_scale = pace_of(self.scanner) if self.time_scale is None else self.time_scale
-        paced = pace(time_scale)
-        simulated = {"seed": self.seed, "age_s": self.age}
-        own: Mapping[str, object] = simulated if self.scanner == SIM else {}
-        drive = {
-            "drive_file": str(drive_file),
-            "required_nodes": [chosen.node, "scan_recorder"],
-            "time_scale": time_scale,
-            **chosen.source,
-        }
-        return [
-            NodeCommand("scan_recorder", {"bag": str(bag), "topics": chosen.topics, **paced}),
-            *(evolve(c, parameters={**c.parameters, **own, **paced}) for c in chosen.commands),
-            NodeCommand("excitation_generator", {**drive, **paced}),
-        ]
+        own = {"seed": self.seed, "age_s": self.age} if self.scanner == SIM else {}
+        record_as_ordered(RecordOrder(plan, bag, f"{title}, to {bag}", chosen, time_scale, own))
 
 
 def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Waveform]]) -> None:

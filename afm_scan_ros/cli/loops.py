@@ -13,7 +13,8 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
-from afm_scan_ros.cli.scan import ScanFiles, drive_limits_of, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import drive_limits_of, run_scan
 from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
@@ -55,7 +56,7 @@ TRUE = "true_displacement"
 
 
 @define
-class NodeSession:
+class RecordedSession:
     """A scanner as the commands' options name it; ``bags``, ``specs``, ``models`` go to ``out``.
 
     ``plant`` and ``seed`` are of the ``scanner`` sim, whose noise is another each time. It becomes
@@ -173,7 +174,7 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     if scanner == SIM:
         load_plant(plant)
     refuse_existing(out / "bags")
-    session = NodeSession(plant, out, seed, scanner, time_scale)
+    session = RecordedSession(plant, out, seed, scanner, time_scale)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:
@@ -290,7 +291,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
     limits = drive_limits_of(scanner, plant)
     refuse_existing(out / "bags")
-    session = NodeSession(plant, out, seed, scanner, time_scale)
+    session = RecordedSession(plant, out, seed, scanner, time_scale)
     done: list[LearningScan] = []
     failure, ended = "", None
     try:

@@ -36,7 +36,6 @@ MODULES = {
     "diagnose": "recorded",
     "invert": "import_csv",
     "learn": "loops",
-    "run": "processes",
 }
 """Modules of the commands that do not stand in one of their name."""
 

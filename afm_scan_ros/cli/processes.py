@@ -1,7 +1,6 @@
-"""Runs the nodes of a scan, as processes or in this one, and reports which failed and why.
+"""Runs the nodes of a scan, each as a process, and reports which failed and why.
 
-Processes communicate in a DDS domain of their own, on this machine alone. ``afm-scan run`` runs one
-node where there is no ``ros2 run``.
+They communicate in a DDS domain of their own, on this machine alone.
 """
 
 import json
@@ -14,33 +13,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from functools import cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO
 
-import click
 from attrs import field, frozen
-from rich.console import Console
-from rich.progress import Progress, TaskID
 
-from afm_scan_ros.cli.options import in_lines
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.types import ProgressCallback
-from afm_scan_ros.nodes import NODES, start
 from afm_scan_ros.nodes.flow import STOPPED
-from afm_scan_ros.nodes.together import GRACE, Ended, run_together
-from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING, SCAN_INFO
-from afm_scan_ros.ros import (
-    ALONE,
-    Message,
-    Node,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
-    shutdown,
-)
 
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise
 
@@ -80,7 +61,8 @@ def _is_free(domain: int) -> bool:
 
 PATIENCE = 3.0
 """Silence of a node, s, after which a simulated scan is given up: only minutes are at stake."""
-INSTALL = "install ROS 2, or cyclonedds by the extra 'dds' as in pip install '.[dds]',"
+GRACE = 5.0
+"""Seconds that the other nodes have to end by themselves once one has ended badly."""
 
 _START = (
     "import sys; from afm_scan_ros.nodes import end_with_parent, start; end_with_parent();"
@@ -96,6 +78,19 @@ _LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
 
 
 @frozen
+class Ended:
+    """How a node ended: 0, 2 bad input, 3 what was asked does not hold, negative for a signal.
+
+    ``traceback`` is its output where that holds the traceback of an unforeseen error.
+    """
+
+    name: str
+    status: int
+    said: str
+    traceback: str = ""
+
+
+@frozen
 class NodeCommand:
     """A node to run, with parameters of a file and, before these, its own."""
 
@@ -108,7 +103,7 @@ class NodeCommand:
         file = ["--params-file", str(self.params_file)] if self.params_file else []
         pairs = [f"{name}:={json.dumps(value)}" for name, value in self.parameters.items()]
         own = [word for pair in pairs for word in ("-p", pair)]
-        return [sys.executable, "-c", _START.format(self.name), "--ros-args", *file, *own]
+        return [sys.executable, "-P", "-c", _START.format(self.name), "--ros-args", *file, *own]
 
 
 @frozen(eq=False)
@@ -155,7 +150,9 @@ class NodeProcess:
 
 def pace(time_scale: float) -> Mapping[str, object]:
     """Return the parameters of every node for the pace; without one, a block may take long."""
-    return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
+    if time_scale:
+        return {"time_scale": time_scale}
+    return {"time_scale": 0.0, "real_time": False, "liveness_timeout_s": PATIENCE}
 
 
 def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:
@@ -188,29 +185,15 @@ def run_nodes(
     """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
 
     ``others`` are nodes that may have begun the trouble too, wherever they run.
-    Each is a process of its own; where other processes cannot be reached all run in this one.
     Raises InputError or ScanError with the messages of the nodes that failed first.
     """
     taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
     before = [signal.signal(number, signal.default_int_handler) for number in taken]
-    names = [*(command.name for command in commands), *others]
     try:
-        if ALONE:
-            _announce_once(
-                f"all nodes run in this process ({ALONE}); {INSTALL} for one process each"
-            )
-            failed = run_together([(each.name, each.arguments()) for each in commands], idle)
-            _raise_failure(failed, names)
-        else:
-            _run_processes(commands, idle, names)
+        _run_processes(commands, idle, [*(command.name for command in commands), *others])
     finally:
         for number, handler in zip(taken, before, strict=True):
             signal.signal(number, handler)
-
-
-@cache
-def _announce_once(text: str) -> None:
-    click.echo(f"afm-scan: {text}", err=True)
 
 
 def _run_processes(
@@ -226,8 +209,8 @@ def _run_processes(
             _wait(running, idle)
         finally:
             stuck = _end(running)
-        _raise_failure([node.ended() for node in running if node not in stuck], names)
-        _raise_failure([node.ended() for node in stuck], names)
+        raise_failure([node.ended() for node in running if node not in stuck], names)
+        raise_failure([node.ended() for node in stuck], names)
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
@@ -255,7 +238,7 @@ def _end(nodes: Sequence[NodeProcess]) -> list[NodeProcess]:
     return alive
 
 
-def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
+def raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     """Raise the error of the nodes that failed by themselves, not because another did.
 
     Its notes are their tracebacks, if any. A scan that was stopped on request is incomplete, though
@@ -273,79 +256,3 @@ def _raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
         if node.traceback:
             error.add_note(node.traceback)
     raise error
-
-
-MOMENT = 0.1
-
-
-class ScanWatch(Node):
-    """Listens to scan_info and node_state; shows the slowest node's progress and all reasons.
-
-    ``report`` writes lines to a log; a terminal shows the bar instead.
-    """
-
-    def __init__(self, progress: Progress, task: TaskID, report: ProgressCallback) -> None:
-        super().__init__("afm_scan")
-        self._progress = progress
-        self._task = task
-        self._report = report
-        self._total = 0
-        self._slowest: dict[str, int] = {}
-        self._last_reason = ""
-        self.create_subscription(SCAN_INFO.kind, SCAN_INFO.name, self._meet, SCAN_INFO.reader)
-        self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
-
-    def _meet(self, info: Message) -> None:
-        self._total = info.total_samples
-        self._progress.update(self._task, total=self._total)
-
-    def _hear(self, state: Message) -> None:
-        if state.state == RUNNING and state.reason not in ("", self._last_reason):
-            self._last_reason = state.reason
-            message = f"{state.node}: {state.reason}"
-            self._progress.console.print(message, highlight=False, soft_wrap=True)
-        self._slowest[state.node] = state.next_sample
-        done = min(self._slowest.values())
-        self._progress.update(self._task, completed=done)
-        if not done:
-            self._report(f"{state.node}: {state.reason or state.state}")
-        elif self._total:
-            self._report(f"{done / self._total:.0%}, sample {done} of {self._total}")
-
-
-def _ignore(doing: str) -> None:
-    """Write no line, because a terminal shows the bar."""
-
-
-@contextmanager
-def watching(title: str) -> Iterator[Callable[[], None]]:
-    """Show a progress bar, or lines in a log; yield a function that listens for a moment."""
-    init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        console = Console(stderr=True)
-        seen = console.is_terminal
-        report = _ignore if seen else in_lines(title, at_once=False)
-        with Progress(console=console, transient=True, disable=not seen) as progress:
-            executor = SingleThreadedExecutor()
-            executor.add_node(ScanWatch(progress, progress.add_task(title, total=None), report))
-            yield lambda: executor.spin_once(timeout_sec=MOMENT)
-            executor.shutdown()
-    finally:
-        shutdown()
-
-
-@click.command(
-    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
-    epilog=f"Nodes: {', '.join(NODES)}.",
-)
-@click.argument("name", type=click.Choice(NODES), metavar="NAME")
-@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-def run(name: str, arguments: tuple[str, ...]) -> int:
-    """Run the node NAME with the arguments of 'ros2 run afm_scan_ros NAME'.
-
-    For example: afm-scan run scan_recorder --ros-args -p bag:=scan1
-    """
-    if ALONE:
-        raise InputError(f"run: a node alone meets no other ({ALONE}): {INSTALL} to run it")
-    sys.argv = [name, *arguments]
-    return start(name)

@@ -1,4 +1,4 @@
-"""``afm-scan scan``: one scan by separate processes, recorded in a bag."""
+"""``afm-scan scan``: one scan, by nodes or in this process, recorded in a bag."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,13 +7,20 @@ from types import MappingProxyType
 from typing import TypedDict, Unpack
 
 import click
-from attrs import evolve, frozen
 
 from afm_scan_ros.cli.options import BAG, CONFIG, FILE, refuse_existing
-from afm_scan_ros.cli.processes import NodeCommand, pace, run_nodes, set_aside, watching
+from afm_scan_ros.cli.orders import (
+    COMPENSATOR,
+    MONITOR,
+    Parameters,
+    ScanFiles,
+    ScanOrder,
+    parameters_of,
+    refuse_pace,
+)
+from afm_scan_ros.cli.processes import set_aside
 from afm_scan_ros.cli.scanner import (
     FILES,
-    SIM,
     ScannerChoice,
     amplifier_of,
     choose,
@@ -23,6 +30,7 @@ from afm_scan_ros.cli.scanner import (
     scanner_options,
     time_scale_option,
 )
+from afm_scan_ros.cli.ways import scan_as_ordered
 from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -32,36 +40,12 @@ from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import TO_AND_FRO
-from afm_scan_ros.files import yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_scan, node_parameters
+from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.flow import FLOW
-from afm_scan_ros.nodes.parameters import inverses_of
-
-COMPENSATOR = "inversion_compensator"
-PIXELS = 256
-"""In a line of the images shown."""
-
-
-Parameters = Mapping[str, object]
-
-
-@frozen
-class ScanFiles:
-    """What a scan is made from, and the folder of the bag that it ends in.
-
-    ``plant`` is that of the ``scanner`` sim. ``learned`` is a learned correction of this scan.
-    """
-
-    spec: Path
-    model: Path
-    plant: Path
-    bag: Path
-    scanner: str = SIM
-    learned: Path | None = None
+from afm_scan_ros.nodes.flow import FLOW, TIME_SCALE
+from afm_scan_ros.nodes.parameters import checked, inverses_of
 
 
 class Online(TypedDict, total=False):
@@ -93,11 +77,11 @@ def run_scan(
     refuse_existing(files.bag)
     model = load_model(files.model)
     inverses_of(inverses, INVERSES)
-    spec, others = load_scan(files.spec, [parameter.name for parameter in FLOW])
+    spec, flow = load_scan(files.spec, [parameter.name for parameter in FLOW])
     if time_scale is None:
-        time_scale = float(others.get("time_scale", pace_of(files.scanner)))
-    if not 0.0 <= time_scale < math.inf:
-        raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+        given = {"time_scale": pace_of(files.scanner), **flow}
+        time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
+    refuse_pace(time_scale)
     corrected = {name: online.get(name) is True for name in ("line_feedback", "adapt")}
     _refuse_unsuited(spec, files.scanner, corrected)
     correction = _correction(files.learned, spec, model, inverses)
@@ -105,19 +89,13 @@ def run_scan(
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
-    beside = [
-        *_imager(spec, images=images),
-        *_monitor(files.model, watched=watched, adapt=corrected["adapt"]),
-    ]
-    commands = _commands(files, scanner, list(inverses), time_scale, beside, corrected)
-    ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
-    own = {**_tighter_limits(scanner), **ahead, **further.get(COMPENSATOR, {})}
-    further = {**further, COMPENSATOR: own}
-    paced = pace(time_scale)
+    own = _own(files, scanner, model, spec, inverses, corrected)
+    every = {part: {**own.get(part, {}), **further.get(part, {})} for part in {*own, *further}}
+    order = ScanOrder(
+        files, spec, flow, model, inverses, scanner, time_scale, every, images, watched
+    )
     try:
-        with watching(f"scan to {files.bag}") as idle:
-            given = [_with_further(c, {**paced, **further.get(c.name, {})}) for c in commands]
-            run_nodes(given, idle, [scanner.node])
+        scan_as_ordered(order)
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 
@@ -147,18 +125,19 @@ def _correction(
     return learned.correction
 
 
-def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:
-    imaged = int((0.5 - spec.overscan) * spec.samples_per_line)
-    if not images or spec.pattern not in TO_AND_FRO or imaged <= PIXELS:
-        return []
-    return [NodeCommand("scan_imager", {"pixels": PIXELS}, CONFIG / "scan_imager.yaml")]
-
-
-def _monitor(model: Path, *, watched: bool, adapt: bool) -> list[NodeCommand]:
-    if not watched:
-        return []
-    parameters = {"model_file": str(model), "min_subscriptions": 1, "adapt": adapt}
-    return [NodeCommand("residual_monitor", parameters, CONFIG / "residual_monitor.yaml")]
+def _own(
+    files: ScanFiles,
+    scanner: ScannerChoice,
+    model: ScannerModel,
+    spec: ScanSpec,
+    inverses: Sequence[str],
+    corrected: Mapping[str, bool],
+) -> dict[str, Parameters]:
+    """Parameters of the compensator and the monitor, before those of their files."""
+    learned = {"learned_file": str(files.learned)} if files.learned else {}
+    ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
+    own = {**learned, **corrected, **_tighter_limits(scanner), **ahead}
+    return {COMPENSATOR: own, MONITOR: {"adapt": corrected["adapt"]}}
 
 
 def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
@@ -171,8 +150,7 @@ def _tighter_limits(scanner: ScannerChoice) -> Parameters:
     """Limits of the scanner below the compensator's, to refuse a scan before it moves."""
     if (limits := scanner.limits) is None:
         return {}
-    path = CONFIG / f"{COMPENSATOR}.yaml"
-    own = node_parameters(yaml.load(path), str(path), COMPENSATOR)
+    own = parameters_of(COMPENSATOR)
     theirs = {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
     return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
 
@@ -182,53 +160,11 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
 
     Those of an external scanner are not known.
     """
-    path = CONFIG / f"{COMPENSATOR}.yaml"
-    own = node_parameters(yaml.load(path), str(path), COMPENSATOR)
+    own = parameters_of(COMPENSATOR)
     voltage, slew = float(own["voltage_limit_v"]), float(own["slew_limit_v_per_s"])
     if (amplifier := amplifier_of(scanner, plant)) is None:
         return DriveLimits(voltage, slew)
     return DriveLimits(min(voltage, amplifier.voltage_limit), min(slew, amplifier.slew_limit))
-
-
-def _with_further(command: NodeCommand, parameters: Parameters) -> NodeCommand:
-    return evolve(command, parameters={**command.parameters, **parameters})
-
-
-def _commands(
-    files: ScanFiles,
-    scanner: ScannerChoice,
-    inverses: list[str],
-    time_scale: float,
-    beside: Sequence[NodeCommand],
-    online: Mapping[str, bool],
-) -> list[NodeCommand]:
-    """All nodes of a scan; those ``beside`` only read the topics of the others.
-
-    ``online`` says whether the compensator corrects by what was achieved, and how.
-    """
-    names = [command.name for command in beside]
-    model: dict[str, object] = {"model_file": str(files.model), "inverses": inverses}
-    learned = {"learned_file": str(files.learned)} if files.learned else {}
-    own: dict[str, object] = {**learned, **online}
-    source = {
-        "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
-        "min_subscriptions": 3 + names.count("scan_imager"),
-        "time_scale": time_scale,
-        **scanner.source,
-    }
-    drive_readers = {"min_subscriptions": 3 + names.count("residual_monitor")}
-    recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
-    readers = {"min_subscriptions": 2 + len(names) + any(online.values())}
-    return [
-        NodeCommand("scan_recorder", recorded, CONFIG / "scan_recorder.yaml"),
-        NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
-        *beside,
-        *(_with_further(command, readers) for command in scanner.commands),
-        NodeCommand(
-            COMPENSATOR, model | drive_readers | own, CONFIG / "inversion_compensator.yaml"
-        ),
-        NodeCommand("trajectory_generator", model | source, files.spec),
-    ]
 
 
 @click.command()

@@ -1,6 +1,5 @@
 """The option --scanner: the simulation, a driver, files, or a node that somebody else started."""
 
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
@@ -14,7 +13,6 @@ from click.core import ParameterSource
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
-from afm_scan_ros.cli.processes import INSTALL, NodeCommand, isolate
 from afm_scan_ros.core.compensation import Compensation, preview_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
@@ -30,16 +28,7 @@ from afm_scan_ros.drivers.files import FileExchange
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, READY, TRUE
-from afm_scan_ros.ros import (
-    ALONE,
-    Message,
-    Node,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
-    try_shutdown,
-)
+from afm_scan_ros.nodes import lacking_ros
 
 FILES = "files"
 
@@ -95,8 +84,8 @@ def _record(exchange: FileExchange, bag: Path, info: ScanInfo, given: dict[str, 
 SIM, EXTERNAL = "sim", "external"
 SIMULATED = SIM, "simulated"
 """Scanners that the default model describes."""
-SCANNERS = ("scanner_driver", "piezoscanner_sim")
-"""Names that the node of an external scanner may have."""
+DRIVER_NODE, SIM_NODE = SCANNERS = ("scanner_driver", "piezoscanner_sim")
+"""Names that the node of a scanner has."""
 PATIENCE = 60.0
 """Longest wait (s) for an external scanner, where nobody says another."""
 _WAIT = "afm_scan_ros.scanner_wait"
@@ -106,16 +95,18 @@ PLANT = CONFIG / "plant.yaml"
 
 @frozen
 class ScannerChoice:
-    """A scanner's node, and what the other nodes of a scan need to know of it.
+    """A scanner by its node, and what the other parts of a scan need to know of it.
 
-    ``commands`` start it, unless somebody else did. ``source`` are parameters of the scan's source.
+    ``parameters`` are its own, before those of its file; ``external`` says that somebody else
+    starts it. ``source`` are parameters of the scan's source.
     """
 
     node: str
-    commands: tuple[NodeCommand, ...] = ()
+    parameters: Mapping[str, object] = field(factory=dict)
     limits: DriveLimits | None = None
     knows_true: bool = False
     source: Mapping[str, object] = field(factory=dict)
+    external: bool = False
 
     @property
     def topics(self) -> list[str]:
@@ -125,27 +116,32 @@ class ScannerChoice:
 
 
 def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
-    """Return the scanner of the option; choose the domain in which the nodes meet.
+    """Return the scanner of the option; waits for an external one.
 
-    Waits for an external one. Raises InputError where the option, or a file, is wrong.
+    Raises InputError where the option, or a file, is wrong.
     """
     if scanner == EXTERNAL:
         return _external()
-    isolate()
     if scanner == SIM:
         limits = load_plant(plant).amplifier.limits
-        command = NodeCommand(
-            "piezoscanner_sim", {"plant_file": str(plant)}, CONFIG / "piezoscanner_sim.yaml"
-        )
-        return ScannerChoice(command.name, (command,), limits, knows_true=True)
+        return ScannerChoice(SIM_NODE, {"plant_file": str(plant)}, limits, knows_true=True)
     driver, file = driver_and_file(scanner)
     settings = load_settings(driver, file).settings
-    command = NodeCommand("scanner_driver", {"driver": driver, "settings_file": str(file)})
     source = {
         "sampling_instant": settings.sampling_instant,
         "trigger_offset_s": settings.trigger_offset,
     }
-    return ScannerChoice(command.name, (command,), settings.amplifier.limits, source=source)
+    own = {"driver": driver, "settings_file": str(file)}
+    return ScannerChoice(DRIVER_NODE, own, settings.amplifier.limits, source=source)
+
+
+def _external() -> ScannerChoice:
+    if lacking := lacking_ros():
+        raise InputError(f"--scanner {EXTERNAL}: {lacking}; a scanner node needs ROS 2")
+    from afm_scan_ros.cli.external import found_scanner  # noqa: PLC0415 - needs ROS
+
+    node, known = found_scanner(SCANNERS, _longest_wait())
+    return ScannerChoice(node, knows_true=known, external=True)
 
 
 def amplifier_of(scanner: str, plant: Path = PLANT) -> AmplifierSpec | None:
@@ -271,42 +267,3 @@ def _driver_and_text(scanner: str) -> tuple[str, str]:
             " module:Class, and :FILE for the scanner's settings"
         )
     return driver, file
-
-
-def _external() -> ScannerChoice:
-    if ALONE:
-        raise InputError(f"--scanner {EXTERNAL}: {ALONE}; {INSTALL} to reach other processes")
-    init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        return _found(Node("scanner_search"))
-    finally:
-        try_shutdown()
-
-
-def _found(node: Node) -> ScannerChoice:
-    """Return the first scanner that waits for a scan, with all of its topics."""
-    waiting: list[str] = []
-
-    def hear(message: Message) -> None:
-        if message.node in SCANNERS and message.state == READY and not message.scan_id:
-            waiting.append(message.node)
-
-    node.create_subscription(NODE_STATE.kind, NODE_STATE.name, hear, NODE_STATE.reader)
-    achieved, true = (node.resolve_topic_name(topic.name) for topic in (ACHIEVED, TRUE))
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    deadline = time.monotonic() + _longest_wait()
-    with working(f"--scanner {EXTERNAL}") as report:
-        while not waiting or node.count_publishers(achieved) != 1:
-            executor.spin_once(timeout_sec=0.1)
-            if (left := deadline - time.monotonic()) < 0.0:
-                domain = os.environ.get("ROS_DOMAIN_ID", "0")
-                raise InputError(
-                    f"--scanner {EXTERNAL}: no scanner waits for a scan in ROS domain {domain}:"
-                    f" start {' or '.join(SCANNERS)} there, and no other scan; or --wait longer"
-                )
-            report(f"waits for a scanner node, for {left:.0f} s at most")
-    known = node.count_publishers(true) > 0
-    executor.shutdown()
-    node.destroy_node()
-    return ScannerChoice(waiting[-1], knows_true=known)

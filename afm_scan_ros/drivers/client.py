@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn, Self
 
 import numpy as np
 from attrs import asdict
@@ -22,6 +22,7 @@ from afm_scan_ros.drivers.link import (
     ENDED,
     ENDING,
     OPEN,
+    OPENED,
     START,
     STOP,
     DriverTimeouts,
@@ -41,38 +42,54 @@ _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.
 class DriverProcess:
     """A driver in its own process, which ramps down when this one is silent, stopped or ended.
 
-    One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. The driver's
-    process has a session of its own: a signal to the group of this one does not reach it.
-    ``knows_true`` says whether each answer has a noise-free displacement. ``latency_samples`` is,
-    once it has started, how much later than its displacement it reads. After an error
-    ``outcome`` says why, and whether the outputs are at rest.
-    Raises InputError where the driver refuses its settings.
+    One request at a time, ``start`` or ``advance``, is ``waiting`` for its ``answer``. ``start``
+    may be asked for at once; ``opened`` waits for what the driver says of its settings before.
+    The driver's process has a session of its own: a signal to the group of this one does not reach
+    it. It writes to ``output``, by default where this one does. ``latency_samples`` is, once it has
+    started, how much later than its displacement it reads, and ``priority`` whether its process has
+    real-time priority, or why not. After an error ``outcome`` says why, and whether the outputs are
+    at rest.
     """
 
-    def __init__(self, choice: DriverChoice, waits: DriverTimeouts) -> None:
+    def __init__(
+        self, choice: DriverChoice, waits: DriverTimeouts, output: IO[str] | None = None
+    ) -> None:
         self.outcome: str | None = None
         self._waits, self._settings = waits, choice.settings
         self._asked = self._allowed = self._period = 0.0
         self._at_rest = True
-        self.latency_samples = 0
+        self.latency_samples, self.priority = 0, ""
         self.waiting = False
         self._block: Trace | None = None
         self._next_sign = 0.0
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-c", _RUN, str(theirs.fileno())],
+                [sys.executable, "-P", "-c", _RUN, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
         self._link = Link(ours)
         self._link.patience = ENDING
+        self._ask_to_open(choice)
+
+    def opened(self) -> Self:
+        """Wait until the driver has opened; ``knows_true`` then says whether it knows that signal.
+
+        Raises InputError where the driver refuses its settings.
+        """
+        if not self._link.readable(self._waits.opening):
+            self.close()
+            raise ScanError(f"the driver did not open within {self._waits.opening:g} s")
         try:
-            self._open(choice)
+            self.knows_true: bool = self._take().fields["knows_true"]
         except (InputError, ScanError):
             self.close()
             raise
+        return self
 
     def start(self, sample_period: float) -> None:
         """Ask the driver to prepare for one sample period (s)."""
@@ -102,9 +119,12 @@ class DriverProcess:
                 raise ScanError(late(self._allowed))
             return None
         message = self._take()
+        if message.kind == OPENED:
+            return None
         self.waiting = False
         if (block := self._block) is None:
             self.latency_samples = message.fields["latency_samples"]
+            self.priority = message.fields["priority"]
             return None
         first, rows = message.fields["first_sample"], iter(message.samples)
         pairs = zip(rows, rows, strict=True)
@@ -124,10 +144,12 @@ class DriverProcess:
     def ramp_down(self, why: str) -> str:
         """Bring the outputs to rest, end the driver, and return why and how, within seconds.
 
-        Where the driver has ended already, that is what is returned.
+        A block that is late may be answered within ENDING, and the ramp begins then. Where the
+        driver has ended already, that is what is returned.
         """
         latency = self.latency_samples * self._period
-        deadline = time.monotonic() + ramp_bound(self._settings, latency)
+        return_of_block = ENDING if self.waiting and self._block else 0.0
+        deadline = time.monotonic() + return_of_block + ramp_bound(self._settings, latency)
         with suppress(InputError, ScanError):
             self._send(Message(STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
@@ -149,7 +171,7 @@ class DriverProcess:
             self._process.wait()
         return "" if self._at_rest else outcome
 
-    def _open(self, choice: DriverChoice) -> None:
+    def _ask_to_open(self, choice: DriverChoice) -> None:
         asked = {
             "driver": choice.driver,
             "settings": to_mapping(choice.settings),
@@ -157,10 +179,11 @@ class DriverProcess:
             "where": choice.where,
             "waits": asdict(self._waits),
         }
-        self._send(Message(OPEN, asked))
-        if not self._link.readable(self._waits.opening):
-            raise ScanError(f"driver {choice.driver} did not open within {self._waits.opening:g} s")
-        self.knows_true: bool = self._take().fields["knows_true"]
+        try:
+            self._send(Message(OPEN, asked))
+        except (InputError, ScanError):
+            self.close()
+            raise
 
     def _request(self, message: Message, allowed: float) -> None:
         self._send(message)
@@ -199,8 +222,9 @@ class DriverProcess:
         if said["bad_input"] and self._block is None:
             self.outcome = reason
             raise InputError(reason)
-        if ramp is None:
-            self._end(f"{reason}; the ramp-down failed: the drive may not be at rest")
+        if isinstance(ramp, str):
+            self._at_rest = False
+            self._end(f"{reason}; {ramp}: the drive may not be at rest")
         self._at_rest = True
         moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._block else ""
         self._end(f"{reason}{moved}")

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 NODES = (
@@ -25,6 +26,20 @@ NODES = (
 
 
 _INPUT = 0
+
+
+def has_rclpy() -> bool:
+    """Return whether ROS's client library is there."""
+    return find_spec("rclpy") is not None
+
+
+def lacking_ros() -> str:
+    """Return why no node can run here; nothing where one can."""
+    if not has_rclpy():
+        return "ROS 2 is not installed, or its setup.bash is not sourced"
+    if find_spec("afm_scan_ros.msg") is None:
+        return "ROS 2 is there, but the messages of afm_scan_ros are not built: run colcon build"
+    return ""
 
 
 def main() -> int:

@@ -3,7 +3,6 @@
 import time
 from abc import abstractmethod
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from math import ceil
 
 from attrs import evolve
@@ -41,12 +40,6 @@ class BlockSource(ScanNode):
     @abstractmethod
     def block(self, first: int, count: int) -> Trace:
         """Return ``count`` samples of the scan from sample ``first``."""
-
-    def identity(self) -> tuple[str, int]:
-        """Return the scan's id and the time, ns, at which it begins."""
-        start = time.time_ns()
-        moment = datetime.fromtimestamp(start / 1e9, UTC)
-        return self.settings["scan_id"] or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
 
     def nodes(self) -> tuple[str, ...]:
         """Return all nodes of the scan in the order of the data flow."""

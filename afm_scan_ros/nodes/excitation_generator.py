@@ -8,7 +8,7 @@ from afm_scan_ros.core.identification.drives.experiments import KINDS, resized
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.drive_files import read_drive
 from afm_scan_ros.nodes.block_source import BlockSource
-from afm_scan_ros.nodes.flow import FLOW, taking_part
+from afm_scan_ros.nodes.flow import FLOW, identity, taking_part
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.topics import DRIVE
 
@@ -35,7 +35,7 @@ class ExcitationGenerator(BlockSource):
         file = self.settings["drive_file"]
         plan = read_drive(Path(file)) if file else KINDS[self.settings["kind"]]()
         self._plan = resized(plan, *sizes)
-        scan_id, start = self.identity()
+        scan_id, start = identity(self.settings["scan_id"])
         info = ScanInfo(
             scan_id,
             start,

@@ -1,5 +1,7 @@
 """How a scan flows from its source: blocks, window, pace; needs no ROS."""
 
+import time
+from datetime import UTC, datetime
 from math import ceil
 
 from afm_scan_ros.core.streams import MAX_BLOCK
@@ -18,6 +20,9 @@ LEAST_BLOCK = 100
 USUAL_WINDOW = 20
 """Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
 
+TIME_SCALE = NodeParameter(
+    "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
+)
 FLOW = (
     NodeParameter(
         "block_size",
@@ -33,9 +38,7 @@ FLOW = (
         f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
         low=0,
     ),
-    NodeParameter(
-        "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
-    ),
+    TIME_SCALE,
     NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
     NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
     NodeParameter(
@@ -51,6 +54,13 @@ FLOW = (
 def block_size_at(sample_period: float) -> int:
     """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
     return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
+
+
+def identity(scan_id: str) -> tuple[str, int]:
+    """Return a scan's id, by default its start time, and the time, ns, at which it begins."""
+    start = time.time_ns()
+    moment = datetime.fromtimestamp(start / 1e9, UTC)
+    return scan_id or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
 
 
 def taking_part(*nodes: str) -> NodeParameter:

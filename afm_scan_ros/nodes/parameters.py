@@ -1,5 +1,6 @@
 """Parameters of the nodes: name, type, description, range; and what is made of their values."""
 
+import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -10,13 +11,15 @@ from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.line_feedback import LEAD
-from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_inversion import InversionSettings
 from afm_scan_ros.core.scan_spec import human_name, scan_parameters
+from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.records import naming
+from afm_scan_ros.files.plant_file import load_plant
+from afm_scan_ros.files.records import converted, naming
 
 Value: TypeAlias = bool | int | float | str | list[str]
 
@@ -106,11 +109,17 @@ ALARMS = (
     ),
     NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
 )
-
-
-def defaults(parameters: Iterable[NodeParameter]) -> dict[str, Any]:
-    """Return the values of parameters that nobody sets."""
-    return {parameter.name: parameter.default for parameter in parameters}
+SIMULATION = (
+    NodeParameter("plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"),
+    NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
+    NodeParameter(
+        "age_s", 0.0, "Time since the scanner was switched on, at the scan's start", low=0.0
+    ),
+    NodeParameter("output_log", "", "File for the outputs and their moments; empty for none"),
+    *DRIVE_LIMITS,
+)
+_METRES = AxisSettings(1.0, 0.0, -sys.float_info.max, sys.float_info.max)
+"""The simulated sensor reads metres, and checks its own range."""
 
 
 def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
@@ -132,6 +141,27 @@ def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
     )
 
 
+def simulated_scanner(settings: Mapping[str, Any], where: str) -> DriverChoice:
+    """Return the simulated scanner by the parameters ``SIMULATION``; its sensor cannot be lost.
+
+    Raises InputError where the plant file, or a limit, is wrong.
+    """
+    with naming("parameter plant_file"):
+        load_plant(Path(settings["plant_file"]))
+    limits = drive_limits(settings)
+    scanner = ScannerSettings(
+        AmplifierSpec(limits.voltage, limits.slew, limits.slew),
+        _METRES,
+        _METRES,
+        latency_samples=0,
+        response_time=1.0,
+        drive_resolution=2.0 * limits.voltage,
+        sampling_instant="before_update",
+    )
+    own = {name: settings[name] for name in ("plant_file", "seed", "output_log")}
+    return DriverChoice("simulated", scanner, own | {"age": settings["age_s"]}, where)
+
+
 def drive_limits(settings: Mapping[str, Any]) -> DriveLimits:
     """Return the limits among a node's parameters; raises InputError where one is zero."""
     try:
@@ -149,6 +179,22 @@ def model_of(settings: Mapping[str, Any]) -> ScannerModel:
 def scan_spec_parameters() -> list[NodeParameter]:
     """Return the parameters of a scan in their file units, such as ``range_x_um``."""
     return [_for_people(attribute) for attribute in scan_parameters()]
+
+
+def checked(parameter: NodeParameter, given: Mapping[str, Any], where: str) -> Any:  # noqa: ANN401 - of the default's type
+    """Return a parameter's value; raises InputError, naming ``where``, where it does not fit."""
+    value: Any = given.get(parameter.name, parameter.default)
+    at = f"{where}: {parameter.name}"
+    if isinstance(parameter.default, float) and type(value) is int:
+        value = float(value)
+    value = converted(type(parameter.default), value, 1.0, at)
+    if parameter.choices and value not in parameter.choices:
+        raise InputError(f"{at} = '{value}' is not one of {', '.join(parameter.choices)}")
+    if parameter.low is not None and value < parameter.low:
+        raise InputError(f"{at} = {value:g} is below {parameter.low:g}: give more")
+    if parameter.high is not None and value > parameter.high:
+        raise InputError(f"{at} = {value:g} is above {parameter.high:g}: give less")
+    return value
 
 
 def inverses_of(names: Iterable[str], known: Iterable[str]) -> frozenset[str]:

@@ -124,6 +124,8 @@ class Peers:
         if all(stands[each.node] <= timeout for each in going if each.next_sample == least):
             return None
         culprit = _culprit(reports, info, [name for name in stands if stands[name] > pause])
+        if culprit.node != own.node and (silent := now - culprit.heard) > 0.5 * timeout:
+            return f"{culprit.node} has been silent for {silent:.2g} s"
         reason = f" ({culprit.reason})" if culprit.reason else ""
         return (
             f"{culprit.node} has finished no sample for {timeout:.3g} s: it stands at sample"

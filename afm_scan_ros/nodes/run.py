@@ -1,11 +1,13 @@
 """Runs one node as a process: its loop, its signals and its exit status."""
 
+import os
 import signal
 import sys
 import time
 import traceback
 from collections.abc import Iterable
 from importlib import import_module
+from pathlib import Path
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -22,6 +24,8 @@ from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
 from afm_scan_ros.nodes.topics import NODE_STATE
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+NICENESS = -11
+"""Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
@@ -62,7 +66,21 @@ def _made(kind: type[ScanNode], warnings: Iterable[str]) -> ScanNode:
     idle = (f"parameter {each} does nothing: {node.NAME} has none" for each in undeclared(node))
     for warning in (*warnings, *idle):
         node.get_logger().warning(warning)
+    if node.settings["real_time"]:
+        _take_priority(node)
     return node
+
+
+def _take_priority(node: ScanNode) -> None:
+    """Let a node that has to keep pace come before usual work, as an audio server does.
+
+    All its threads: those of DDS are there by now. A system may not permit it.
+    """
+    try:
+        for thread in Path("/proc/self/task").iterdir():
+            os.setpriority(os.PRIO_PROCESS, int(thread.name), NICENESS)
+    except OSError as error:
+        node.get_logger().info(f"no priority over other work: {error}")
 
 
 def _report_refusal(name: str, error: InputError) -> None:

@@ -23,6 +23,8 @@ HEARTBEAT = 0.05
 """Seconds between two states of a node."""
 WATCH = 0.02
 """Seconds between two looks at the other nodes."""
+SILENCE_AT_REST = 5.0
+"""Silence (s) of the source after which a node no longer waits for its scan: nothing moves yet."""
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
@@ -202,7 +204,8 @@ class ScanNode(Node, ABC):
 
         And where samples stand still while the scan runs.
         """
-        trouble = self.peers.failure() or self.silence(self.watched(), now, self.patience())
+        patience = self.patience() if self.state == RUNNING else SILENCE_AT_REST
+        trouble = self.peers.failure() or self.silence(self.watched(), now, patience)
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
         if trouble is None and self.info is not None and self.state == RUNNING:
@@ -213,7 +216,7 @@ class ScanNode(Node, ABC):
         self._watch_publishers(now)
 
     def patience(self) -> float:
-        """Return how long (s) another node may be silent."""
+        """Return how long (s) another node may be silent while the scan runs."""
         return float(self.settings["liveness_timeout_s"])
 
     def longest_standstill(self) -> float:

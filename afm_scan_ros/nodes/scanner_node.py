@@ -18,6 +18,7 @@ from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE
 from afm_scan_ros.nodes.run import IDLE
+from afm_scan_ros.nodes.scan_node import HEARTBEAT
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
 AHEAD = 0.05
@@ -68,11 +69,14 @@ class ScannerNode(ManagedConsumer):
         given = self.settings
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
+        # The nodes know of whom the drive is missing, and speak first.
+        starved = upstream * max(1.0, given["time_scale"]) + HEARTBEAT
         real, simulated = (
-            DriverTimeouts(upstream, opening, upstream),
-            DriverTimeouts(liveness, opening, opening),
+            DriverTimeouts(upstream, starved, opening, upstream, real_time=True),
+            DriverTimeouts(liveness, opening, opening, opening, real_time=False),
         )
-        self._driver = DriverProcess(self._choice, real if given["real_time"] else simulated)
+        waits = real if given["real_time"] else simulated
+        self._driver = DriverProcess(self._choice, waits).opened()
         self._is_open = True
         if self._driver.knows_true:  # before the other, whose readers then know of this one
             self.write(TRUE, given["min_true_subscriptions"])
@@ -90,11 +94,12 @@ class ScannerNode(ManagedConsumer):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Let the driver start; raises InputError where the scan does not fit its settings."""
-        self._check(info)
+        self._choice.refuse_other_instant(info.sampling_instant, info.trigger_offset)
         self._driver.start(info.sample_period)
         while self._driver.waiting:
             yield "waits for the driver to start"
             self._driver.answer(IDLE)
+        self.get_logger().info(f"driver: {self._driver.priority}")
         if 2 * (late := self._driver.latency_samples) > info.window:
             raise InputError(
                 f"{self._choice.where}: latency_samples = {late}, with the driver's buffer, is over"
@@ -129,7 +134,7 @@ class ScannerNode(ManagedConsumer):
         }
 
     def patience(self) -> float:
-        """Return how long (s) another node may be silent: the drive is not to wait for it."""
+        """Return how long (s) another node may be silent while the drive is up."""
         name = "upstream_timeout_s" if self.settings["real_time"] else "liveness_timeout_s"
         return float(self.settings[name])
 
@@ -174,14 +179,3 @@ class ScannerNode(ManagedConsumer):
         self.advance_to(end(moved[-1][0]))
         if last:
             self.go(DONE)
-
-    def _check(self, info: ScanInfo) -> None:
-        """Raise InputError where the settings contradict what is said of the scan."""
-        settings, where = self._choice.settings, self._choice.where
-        own = settings.sampling_instant, settings.trigger_offset
-        if own != (info.sampling_instant, info.trigger_offset):
-            raise InputError(
-                f"{where}: samples are taken {own[0]}, with an offset of {own[1]:g} s, but the"
-                f" source says {info.sampling_instant}, {info.trigger_offset:g} s: give the source"
-                " the same sampling_instant and trigger_offset_s"
-            )

@@ -10,7 +10,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_source import BlockSource
 from afm_scan_ros.nodes.declare import scan_spec
-from afm_scan_ros.nodes.flow import FLOW, STOPPED, taking_part
+from afm_scan_ros.nodes.flow import FLOW, STOPPED, identity, taking_part
 from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, model_of
 from afm_scan_ros.nodes.peers import RUNNING
@@ -36,7 +36,7 @@ class TrajectoryGenerator(BlockSource):
         desired(self._spec, phases(self._spec).lines.start, 1)  # a line is computed here, not later
         self.create_service(Trigger, "stop", self._stop)
         info = evolve(
-            info_of_scan(self._spec, *self.identity()),
+            info_of_scan(self._spec, *identity(self.settings["scan_id"])),
             inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
             model_hash=model_hash(model_of(self.settings)),
             nodes=self.nodes(),

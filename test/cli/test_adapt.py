@@ -8,8 +8,9 @@ from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
+from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.recorded import adapt
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import loops as command
-from afm_scan_ros.cli.loops import NodeSession
+from afm_scan_ros.cli.loops import RecordedSession
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -61,7 +61,9 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "CANDIDATES", few)
         patch.setattr(
-            command, "NodeSession", lambda plant, _, seed, *__: OneProcess(load_plant(plant), seed)
+            command,
+            "RecordedSession",
+            lambda plant, _, seed, *__: OneProcess(load_plant(plant), seed),
         )
         return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
 
@@ -227,7 +229,7 @@ def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    by_nodes = NodeSession(CONFIG / "plant.yaml", tmp_path, seed=7)
+    by_nodes = RecordedSession(CONFIG / "plant.yaml", tmp_path, seed=7)
     in_process = InProcessSession(load_plant(CONFIG / "plant.yaml"), seed=7)
     model = default_model()
     one, other = (each.scan("same_0", SPEC, model) for each in (by_nodes, in_process))

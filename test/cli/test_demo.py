@@ -11,7 +11,7 @@ from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli import demo as demonstration
 from afm_scan_ros.cli.main import COMMANDS
-from afm_scan_ros.cli.scan import ScanFiles
+from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.files.plant_file import load_scan
 from helpers.in_process import scan

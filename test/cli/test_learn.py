@@ -56,7 +56,7 @@ def learn(folder: Path, *words: str, plant: str = "plant.yaml", scans_left: int 
     given = ["--spec", str(scan_file(folder)), "--plant", str(path), "--out", str(folder / "out")]
     with pytest.MonkeyPatch.context() as patch:
         session = OneProcess(load_plant(path), scans_left=scans_left)
-        patch.setattr(command, "NodeSession", lambda *_: session)
+        patch.setattr(command, "RecordedSession", lambda *_: session)
         return CliRunner().invoke(command.learn, [*given, *words])
 
 

@@ -6,7 +6,8 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 
 SPEC = """\

@@ -32,7 +32,7 @@ def test_each_scan_begins_as_old_as_those_before_took(
 
     monkeypatch.setattr(loops, "run_scan", run_scan)
     monkeypatch.setattr(loops, "read_scan", read_scan)
-    made = loops.NodeSession(CONFIG / "plant.yaml", tmp_path, seed=1)
+    made = loops.RecordedSession(CONFIG / "plant.yaml", tmp_path, seed=1)
     for label in ("first", "second", "third"):
         made.scan(label, FAST_SPEC, default_model())
     took = TOTAL * FAST_SPEC.sample_period

@@ -2,16 +2,13 @@
 
 import pytest
 
-from afm_scan_ros.cli import processes
+from afm_scan_ros.cli.processes import Ended, raise_failure
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.flow import STOPPED
-from afm_scan_ros.nodes.together import Ended
 
 
-def test_a_stopped_scan_is_incomplete_to_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_scan_is_incomplete_to_the_command() -> None:
     said = f"trajectory_generator: done: {STOPPED} at sample 5"
     ended = [Ended("trajectory_generator", 0, said), Ended("scan_recorder", 0, "")]
-    monkeypatch.setattr(processes, "run_together", lambda *_: ended)
-    monkeypatch.setattr(processes, "ALONE", "no DDS")
     with pytest.raises(ScanError, match=f"^{said}$"):
-        processes.run_nodes([], lambda: None)
+        raise_failure(ended, [each.name for each in ended])

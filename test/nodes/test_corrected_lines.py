@@ -7,7 +7,8 @@ import pytest
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases
 

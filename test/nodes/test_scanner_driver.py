@@ -14,8 +14,9 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.cli.scan import ScanFiles, run_scan, scan
+from afm_scan_ros.cli.scan import run_scan, scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.types import Trace

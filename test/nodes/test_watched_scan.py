@@ -6,7 +6,8 @@ import pytest
 
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 
 LINES = 6

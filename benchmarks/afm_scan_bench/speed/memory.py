@@ -11,7 +11,8 @@ from threading import Event, Thread, get_native_id
 
 from afm_scan_bench.speed.timing.ratios import COLUMNS, row
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.nodes import NODES
 from afm_scan_ros.report.table import Table

@@ -11,7 +11,8 @@ import pytest
 
 from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_scan import AdaptedScan

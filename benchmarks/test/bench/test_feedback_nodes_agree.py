@@ -9,7 +9,8 @@ from afm_scan_bench.learning.fed_back_scan import fed_back_scan
 from afm_scan_bench.learning.line_feedback import line_errors
 from afm_scan_bench.scans import ALL
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 

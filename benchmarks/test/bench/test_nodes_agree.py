@@ -7,7 +7,8 @@ import pytest
 
 from afm_scan_bench.scans import ALL, scan
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.scan import ScanFiles, run_scan
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.files import share_directory
 
 CONFIG = share_directory() / "config"

@@ -1,0 +1,119 @@
+"""A scan or a record by nodes, a process each; needs ROS."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from attrs import evolve
+
+from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.orders import (
+    COMPENSATOR,
+    MONITOR,
+    Parameters,
+    RecordOrder,
+    ScanOrder,
+    file_of,
+)
+from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes
+from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
+from afm_scan_ros.cli.watch import watching
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import TO_AND_FRO
+from afm_scan_ros.files.drive_files import save_drive
+
+PIXELS = 256
+"""In a line of the images shown."""
+
+
+def scan(order: ScanOrder) -> None:
+    """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
+    paced = pace(order.time_scale)
+    commands = [_with(c, {**paced, **order.own.get(c.name, {})}) for c in _scan_commands(order)]
+    _run(commands, order.scanner, f"scan to {order.files.bag}")
+
+
+def record(order: RecordOrder) -> None:
+    """Drive the scanner through a plan; raises as ``scan`` does."""
+    with TemporaryDirectory() as folder:
+        drive_file = save_drive(Path(folder), order.plan)
+        commands = _record_commands(order, drive_file)
+        commands = [_with(command, pace(order.time_scale)) for command in commands]
+        _run(commands, order.scanner, order.title)
+
+
+def _run(commands: Sequence[NodeCommand], scanner: ScannerChoice, title: str) -> None:
+    if not scanner.external:
+        isolate()
+    with watching(title) as idle:
+        run_nodes(commands, idle, [scanner.node])
+
+
+def _with(command: NodeCommand, parameters: Mapping[str, object]) -> NodeCommand:
+    return evolve(command, parameters={**command.parameters, **parameters})
+
+
+def _scanner_commands(scanner: ScannerChoice, own: Parameters) -> list[NodeCommand]:
+    """Return the scanner's node, unless somebody else starts it."""
+    if scanner.external:
+        return []
+    file = file_of(SIM_NODE) if scanner.node == SIM_NODE else None
+    return [NodeCommand(scanner.node, {**scanner.parameters, **own}, file)]
+
+
+def _record_commands(order: RecordOrder, drive_file: Path) -> list[NodeCommand]:
+    scanner = order.scanner
+    source = {
+        "drive_file": str(drive_file),
+        "required_nodes": [scanner.node, "scan_recorder"],
+        "time_scale": order.time_scale,
+        **scanner.source,
+    }
+    return [
+        NodeCommand("scan_recorder", {"bag": str(order.bag), "topics": scanner.topics}),
+        *_scanner_commands(scanner, order.own),
+        NodeCommand("excitation_generator", source),
+    ]
+
+
+def _scan_commands(order: ScanOrder) -> list[NodeCommand]:
+    """Return all nodes of a scan; imager and monitors only read the topics of the others."""
+    files, scanner = order.files, order.scanner
+    beside = [*_imager(order.spec, images=order.images), *_monitor(order)]
+    names = [command.name for command in beside]
+    model: dict[str, object] = {
+        "model_file": str(files.model),
+        "inverses": list(order.inverses),
+    }
+    fed_back = any(order.own[COMPENSATOR].get(name) for name in ("line_feedback", "adapt"))
+    source = {
+        "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
+        "min_subscriptions": 3 + names.count("scan_imager"),
+        "time_scale": order.time_scale,
+        **scanner.source,
+    }
+    drive_readers = {"min_subscriptions": 3 + names.count(MONITOR)}
+    recorded = {"bag": str(files.bag), "topics": ["desired_displacement", *scanner.topics]}
+    readers = {"min_subscriptions": 2 + len(names) + fed_back}
+    return [
+        NodeCommand("scan_recorder", recorded, file_of("scan_recorder")),
+        NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
+        *beside,
+        *_scanner_commands(scanner, readers),
+        NodeCommand(COMPENSATOR, model | drive_readers, file_of(COMPENSATOR)),
+        NodeCommand("trajectory_generator", model | source, files.spec),
+    ]
+
+
+def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:
+    imaged = int((0.5 - spec.overscan) * spec.samples_per_line)
+    if not images or spec.pattern not in TO_AND_FRO or imaged <= PIXELS:
+        return []
+    return [NodeCommand("scan_imager", {"pixels": PIXELS}, CONFIG / "scan_imager.yaml")]
+
+
+def _monitor(order: ScanOrder) -> list[NodeCommand]:
+    if not order.watched:
+        return []
+    parameters = {"model_file": str(order.files.model), "min_subscriptions": 1}
+    return [NodeCommand(MONITOR, parameters, file_of(MONITOR))]

@@ -1,0 +1,124 @@
+"""A scan or a record in this process, where there is no ROS."""
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from attrs import evolve
+
+from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.cli.orders import (
+    COMPENSATOR,
+    MONITOR,
+    Parameters,
+    RecordOrder,
+    ScanOrder,
+    parameters_of,
+)
+from afm_scan_ros.cli.progress import showing
+from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
+from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
+from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
+from afm_scan_ros.core.identification.drives.excitation import excitation_block
+from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.scan_inversion import ScanInversion
+from afm_scan_ros.core.trajectory import desired
+from afm_scan_ros.drivers import DriverChoice, load_settings
+from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
+from afm_scan_ros.nodes.parameters import (
+    ADAPTATION,
+    ALARMS,
+    INVERSION,
+    SIMULATION,
+    NodeParameter,
+    checked,
+    inversion_settings,
+    simulated_scanner,
+)
+from afm_scan_ros.pipeline import ScanChain, run
+
+
+def scan(order: ScanOrder) -> None:
+    """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
+    files, spec = order.files, order.spec
+    flow = _flow({**order.flow, **order.scanner.source}, str(files.spec))
+    own = _settings(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    given = inversion_settings({**own, "inverses": order.inverses})
+    info = evolve(
+        info_of_scan(spec, *identity(flow["scan_id"])),
+        inverses=tuple(sorted(given.inverses)),
+        model_hash=model_hash(order.model),
+    )
+    learned = load_learned(files.learned).correction if files.learned else None
+    chain = ScanChain(
+        block=partial(desired, spec),
+        driver=_driver(order.scanner, order.own.get(order.scanner.node, {})),
+        scanner=order.scanner.node,
+        streams=("desired_displacement", *order.scanner.topics),
+        time_scale=order.time_scale,
+        inversion=ScanInversion(order.model, spec, given, learned),
+        preflight=min(info.total_samples, own["preflight_samples"]),
+        monitor=_monitor(order),
+        **_flowing(info, flow),
+    )
+    with showing(f"scan to {files.bag}") as shown:
+        run(chain, files.bag, shown)
+
+
+def record(order: RecordOrder) -> None:
+    """Drive the scanner through a plan; raises as ``scan`` does."""
+    plan, flow = order.plan, _flow(order.scanner.source, order.plan.name)
+    info = ScanInfo(*identity(""), plan.name, plan.sample_period, plan.total_samples)
+    chain = ScanChain(
+        block=partial(excitation_block, plan),
+        driver=_driver(order.scanner, order.own),
+        scanner=order.scanner.node,
+        streams=order.scanner.topics,
+        time_scale=order.time_scale,
+        **_flowing(info, flow),
+    )
+    with showing(order.title) as shown:
+        run(chain, order.bag, shown)
+
+
+def _flow(given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    return {each.name: checked(each, given, where) for each in FLOW}
+
+
+def _flowing(info: ScanInfo, flow: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description of a scan, and the size of its blocks."""
+    size = flow["block_size"] or block_size_at(info.sample_period)
+    info = evolve(
+        info,
+        window=flow["window"] or USUAL_WINDOW * size,
+        sampling_instant=flow["sampling_instant"],
+        trigger_offset=flow["trigger_offset_s"],
+    )
+    return {"info": info, "block_size": size}
+
+
+def _settings(part: str, parameters: Iterable[NodeParameter], own: Parameters) -> dict[str, Any]:
+    """Return a part's parameters: its own before those of its file, and these before defaults."""
+    given = {**parameters_of(part), **own}
+    return {each.name: given.get(each.name, each.default) for each in parameters}
+
+
+def _driver(scanner: ScannerChoice, own: Parameters) -> DriverChoice:
+    given = {**scanner.parameters, **own}
+    if scanner.node == SIM_NODE:
+        return simulated_scanner(_settings(SIM_NODE, SIMULATION, given), SIM_NODE)
+    return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
+
+
+def _monitor(order: ScanOrder) -> ScanMonitor | None:
+    if not order.watched:
+        return None
+    given = _settings(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
+    adaptation = None
+    if given["adapt"]:
+        adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])
+    watch = ResidualWatch(given["alarm"], given["alarm_lines"])
+    return ScanMonitor(order.model, order.spec, watch, adaptation)

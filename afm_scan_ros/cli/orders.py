@@ -1,0 +1,87 @@
+"""What a scan or a record is made of, however it is run: by nodes, or in this process."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from attrs import frozen
+
+from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.scanner import SIM, ScannerChoice
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives.excitation import Plan
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files import yaml
+from afm_scan_ros.files.plant_file import node_parameters
+
+COMPENSATOR, MONITOR = "inversion_compensator", "residual_monitor"
+
+Parameters = Mapping[str, object]
+
+
+@frozen
+class ScanFiles:
+    """What a scan is made from, and the folder of the bag that it ends in.
+
+    ``plant`` is that of the ``scanner`` sim. ``learned`` is a learned correction of this scan.
+    """
+
+    spec: Path
+    model: Path
+    plant: Path
+    bag: Path
+    scanner: str = SIM
+    learned: Path | None = None
+
+
+@frozen(eq=False)
+class ScanOrder:
+    """A scan.
+
+    ``flow`` are parameters of its source that its file sets. ``own`` are those of the other parts
+    by their names, before those of their files. With ``images`` it is imaged, ``watched`` its
+    residual is monitored.
+    """
+
+    files: ScanFiles
+    spec: ScanSpec
+    flow: Mapping[str, Any]
+    model: ScannerModel
+    inverses: tuple[str, ...]
+    scanner: ScannerChoice
+    time_scale: float
+    own: Mapping[str, Parameters]
+    images: bool
+    watched: bool
+
+
+@frozen(eq=False)
+class RecordOrder:
+    """A drive through a plan, recorded in a bag; ``own`` are parameters of the scanner."""
+
+    plan: Plan[Waveform]
+    bag: Path
+    title: str
+    scanner: ScannerChoice
+    time_scale: float
+    own: Parameters
+
+
+def refuse_pace(time_scale: float) -> None:
+    """Raise InputError for a time scale that is none."""
+    if not 0.0 <= time_scale < math.inf:
+        raise InputError(f"time_scale = {time_scale:g}: give 1 for real time, 0 for no pacing")
+
+
+def file_of(part: str) -> Path:
+    """Return the file with the parameters of a part of a scan."""
+    return CONFIG / f"{part}.yaml"
+
+
+def parameters_of(part: str) -> dict[str, Any]:
+    """Return the parameters that this file sets."""
+    path = file_of(part)
+    return node_parameters(yaml.load(path), str(path), part)
