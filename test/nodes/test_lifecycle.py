@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from afm_scan_ros.bag.reader import read_scan
@@ -164,7 +163,7 @@ def test_a_node_that_is_shut_down_ends_well(operator: Operator, start: Start) ->
 def test_a_transition_that_is_impossible_keeps_the_node_alive(
     operator: Operator, start: Start
 ) -> None:
-    """rclpy by itself raises, which would end it."""
+    """Rclpy by itself raises, which would end it."""
     node = start(NAME)
     operator.until(lambda: operator.reason() == "waits for scan_info")
     for label in ("configure", "activate", "cleanup", "nonsense"):
