@@ -24,7 +24,7 @@ from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
-from afm_scan_ros.drivers import DriverChoice
+from afm_scan_ros.drivers import DriverChoice, load_settings
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
