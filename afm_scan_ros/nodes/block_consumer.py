@@ -173,10 +173,14 @@ class BlockConsumer(ScanNode):
         return block
 
     def advance(self) -> None:
-        """Report the sample up to which all topics are processed; done when all are complete."""
-        self.advance_to(min(guard.next_sample for guard in self._block_guards.values()))
+        """Report the sample up to which the node is finished; done when all topics are complete."""
+        self.advance_to(min(self._block_guards[name].next_sample for name in self.counted()))
         if all(guard.complete for guard in self._block_guards.values()):
             self.go(DONE)
+
+    def counted(self) -> Sequence[str]:
+        """Return the topics whose samples are the node's progress."""
+        return self._followed
 
     def _meet(self, message: Message, _: int) -> None:
         if self.info is not None:

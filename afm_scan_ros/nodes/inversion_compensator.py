@@ -1,7 +1,7 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from afm_scan_ros.bag.scan_info import ScanInfo
@@ -74,6 +74,10 @@ class InversionCompensator(BlockConsumer):
             return
         self._refuse_narrow_window(len(block.x))
         self._drive(self._inversion.desired(block, last=last))
+
+    def counted(self) -> Sequence[str]:
+        """Count what was desired: what was achieved waits for a scanner that may stand still."""
+        return (DESIRED.name,)
 
     def _drive(self, blocks: Iterable[Trace]) -> None:
         for drive in blocks:

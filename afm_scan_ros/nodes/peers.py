@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from attrs import evolve, frozen
 
+from afm_scan_ros.bag.scan_info import ScanInfo
+
 READY, RUNNING, DONE, FAILED = "ready", "running", "done", "failed"
 
 
@@ -101,31 +103,27 @@ class Peers:
         silent = (name for name, last in heard.items() if now - max(self._since, last) > timeout)
         return next((f"{name} has been silent for {timeout:g} s" for name in silent), None)
 
-    def standstill(self, own: Report, window: int, now: float, timeout: float) -> str | None:
+    def standstill(
+        self, own: Report, info: ScanInfo, now: float, timeout: float, pause: float
+    ) -> str | None:
         """Name the node at which samples stand still, where the slowest has for ``timeout`` s.
 
-        ``own`` is the watching node's state. The source stands still by itself where it could send:
-        it may be ``window`` samples ahead of the slowest. Elsewhere samples wait for the node that
-        is farthest behind those before it in the data flow.
+        ``own`` is the watching node's state. A node works that has advanced within ``pause`` s.
         """
         known = [own if name == own.node else self.of_scan(name) for name in self._order]
         reports = [each for each in known if each is not None]
         if len(reports) < len(self._order) or reports[0].state != RUNNING:
             return None
         began = max(self._since, self._began)
-        reports = [
-            evolve(each, advanced=began) if each.state == READY else each for each in reports
-        ]
-        going = [each for each in reports if each.state != DONE]
-        still = [each for each in going if now - max(began, each.advanced) > timeout]
-        least = min(each.next_sample for each in going)
-        if not any(each.next_sample == least for each in still):
+        stands = {
+            each.node: now - (began if each.state == READY else max(began, each.advanced))
+            for each in reports
+        }
+        going = [each for each in reports[1:] if each.state != DONE]
+        least = min((each.next_sample for each in going), default=0)
+        if all(stands[each.node] <= timeout for each in going if each.next_sample == least):
             return None
-        source = reports[0]
-        if source in still and source.next_sample - least < window // 2:
-            culprit = source
-        else:
-            culprit = max(still, key=lambda each: _lag(each, reports))
+        culprit = _culprit(reports, info, [name for name in stands if stands[name] > pause])
         if culprit.node != own.node and (silent := now - culprit.heard) > 0.5 * timeout:
             return f"{culprit.node} has been silent for {silent:.2g} s"
         reason = f" ({culprit.reason})" if culprit.reason else ""
@@ -147,10 +145,28 @@ class Peers:
         return f"{name} ({report.reason or report.state})"
 
 
+def _culprit(reports: Sequence[Report], info: ScanInfo, standing: Sequence[str]) -> Report:
+    """Return the one of the ``standing`` nodes for which the samples wait.
+
+    The source stands by itself where it could send: it may be a window ahead of the slowest. Others
+    are behind those before them in the data flow; those after the culprit are so too, but by no
+    more than the preview and the latency between them, for which nodes demand half a window. After
+    the scan's last sample nobody keeps any, so that the first who is behind has stopped.
+    """
+    source, *others = reports
+    waiting = [each for each in others if each.node in standing and each.state != DONE]
+    slowest = min(waiting, key=lambda each: each.next_sample)
+    if source.next_sample == info.total_samples:
+        return next((each for each in waiting if _lag(each, reports)), slowest)
+    if source.node in standing and source.next_sample - slowest.next_sample < info.window // 2:
+        return source
+    return max(waiting, key=lambda each: _lag(each, reports))
+
+
 def _lag(report: Report, reports: Sequence[Report]) -> int:
     """Return how far a node is behind the slowest of those before it in the data flow."""
-    before = [each.next_sample for each in reports[: reports.index(report)]]
-    return min(before, default=report.next_sample) - report.next_sample
+    before = reports[: reports.index(report)]
+    return min(each.next_sample for each in before) - report.next_sample
 
 
 def _falls_back(before: Report, report: Report) -> bool:

@@ -29,6 +29,10 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
+NAMING = 0.2
+"""Longest time, s, in which the name of a publisher's node follows on the publisher."""
+_UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""What rmw calls a node until then."""
 
 COMMON = (
     NodeParameter(
@@ -85,6 +89,7 @@ class ScanNode(Node, ABC):
         self._heartbeat = Thread(target=self._beat, daemon=True)
         self._readers: list[tuple[Subscription, Callable[[Message, Mapping[str, int]], None]]] = []
         self._publishers_of: dict[str, dict[bytes, str]] = {}
+        self._crowded_since = 0.0
         self._longest_block = 0.0
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
@@ -204,11 +209,11 @@ class ScanNode(Node, ABC):
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
         if trouble is None and self.info is not None and self.state == RUNNING:
-            own = self._own_report()
-            trouble = self.peers.standstill(own, self.info.window, now, self.longest_standstill())
+            limits = self.longest_standstill(), self._longest_pause()
+            trouble = self.peers.standstill(self._own_report(), self.info, now, *limits)
         if trouble:
             raise ScanError(trouble)
-        self._watch_publishers()
+        self._watch_publishers(now)
 
     def patience(self) -> float:
         """Return how long (s) another node may be silent while the scan runs."""
@@ -220,6 +225,12 @@ class ScanNode(Node, ABC):
             return float(self.settings["liveness_timeout_s"])
         scale = max(1.0, self.settings["time_scale"])
         return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
+
+    def _longest_pause(self) -> float:
+        """Return how long (s) a node that works may seem to stand: a block, and two heartbeats."""
+        if not self.settings["real_time"]:
+            return 0.5 * self.longest_standstill()
+        return float(self.settings["time_scale"]) * self._longest_block + 2.0 * HEARTBEAT
 
     def _own_report(self) -> Report:
         name, now = self.get_name(), time.monotonic()
@@ -364,13 +375,15 @@ class ScanNode(Node, ABC):
         found = self.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True)
         return {bytes(each.endpoint_gid): each.node_name for each in found}
 
-    def _watch_publishers(self) -> None:
-        """Raise ScanError where a topic of the scan has got another publisher."""
+    def _watch_publishers(self, now: float) -> None:
+        """Raise ScanError where a topic of the scan has got another publisher, once it is named."""
         for topic, pinned in self._publishers_of.items():
             if self.count_publishers(topic) > len(pinned):
-                others = sorted({*self._gids(topic).values()} - {*pinned.values()})
-                named = f" ({', '.join(others)})" if others else ""
-                raise ScanError(f"{topic} has another publisher{named}: stop all but one")
+                self._crowded_since = self._crowded_since or now
+                others = sorted({*self._gids(topic).values()} - {*pinned.values(), _UNNAMED})
+                if others or now - self._crowded_since > NAMING:
+                    named = f" ({', '.join(others)})" if others else ""
+                    raise ScanError(f"{topic} has another publisher{named}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]
