@@ -42,7 +42,9 @@ EVERY = RowRange()
 
 CHANCE = 0.01
 """Share of whole files without an end of line that may be taken for files cut short."""
-NUMBER = re.compile(r'\W*(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*')
+NUMBER = re.compile(
+    r'\W*+(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*'
+)
 
 
 def ends_within(cells: Sequence[str]) -> bool:
