@@ -11,7 +11,8 @@ from scipy.io.matlab import matfile_version
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.arrays import check_elements, open_archive, read_member, read_npy
+from afm_scan_ros.files.arrays import open_archive, read_member, read_npy
+from afm_scan_ros.files.matlab import check_elements
 from afm_scan_ros.files.text_table import EVERY, RowRange, TextTable, read_text
 
 LEVEL_5 = 1
