@@ -13,12 +13,10 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.arrays import open_archive, read_member, read_npy
 from afm_scan_ros.files.matlab import check_elements
-from afm_scan_ros.files.text_table import EVERY, RowRange, TextTable, read_text
+from afm_scan_ros.files.text_table import EVERY, MOST_COLUMNS, RowRange, TextTable, read_text
 
 LEVEL_5 = 1
 """Major version of MATLAB's files since its version 5, except for 7.3."""
-MOST_COLUMNS = 10_000
-"""Columns of an array, many times a converter's channels: what has more is no record."""
 GIVE = (
     f"give real numbers, the samples along the first axis and at most {MOST_COLUMNS} others beside"
 )
