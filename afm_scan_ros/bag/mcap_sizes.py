@@ -24,16 +24,18 @@ def refuse_sizes(path: Path) -> None:
     try:
         with path.open("rb") as stream:
             place = stream.seek(len(MCAP0_MAGIC))
-            while place + HEAD.size <= size:
+            while place + HEAD.size <= size and count <= _FEW + size / _LEAST:
                 kind, length = HEAD.unpack(stream.read(HEAD.size))
                 if kind == Opcode.CHUNK and place + HEAD.size + _CHUNK_HEAD.size <= size:
                     *_, stated = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
                     unpacked += stated if stated <= FREE else 0  # it is not unpacked
                     refuse_unfolding(unpacked, size)
                 count += 1
-                if count > _FEW + size / _LEAST:
-                    raise ValueError(f"over {count} records in {size} bytes, which say nothing")
                 place += HEAD.size + length
                 stream.seek(min(place, size))
     except ValueError as error:
-        raise InputError(f"{path}: {error}: record it again") from error
+        raise InputError(f"{path}: {error}") from error
+    if count > _FEW + size / _LEAST:
+        raise InputError(
+            f"{path}: over {count} records in {size} bytes, which say nothing: record it again"
+        )
