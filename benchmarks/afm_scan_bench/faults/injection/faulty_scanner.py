@@ -79,7 +79,7 @@ SOURCE, SCANNER, RECORDER = "excitation_generator", "piezoscanner_sim", "scan_re
 SILENT = f"{SCANNER} has been silent"
 _SOURCE_SILENT = f"{SOURCE} has been silent"
 _RECORDER_SILENT = f"{RECORDER} has been silent"
-_LATE = "the driver has not answered"
+_LATE = "has not answered"
 _LOST = "the sensor is lost"
 FAULTS = (
     Fault("scanner's node killed (SIGKILL)", SILENT, number=signal.SIGKILL),
@@ -214,7 +214,7 @@ class LateScanner(FaultyScanner):
     def fail(self, drive: Trace) -> Reading:
         """Answer half a second after the answer is due."""
         time.sleep(LATE)
-        return super().advance(drive)
+        return SimulatedScanner.advance(self, drive)
 
 
 class HungScanner(FaultyScanner):
@@ -225,7 +225,7 @@ class HungScanner(FaultyScanner):
     def fail(self, drive: Trace) -> Reading:
         """Wait for ever."""
         _sleep()
-        return super().advance(drive)
+        return SimulatedScanner.advance(self, drive)
 
 
 class RaisingWatchdog(FaultyScanner):
