@@ -3,26 +3,30 @@
 
 VENV := .venv
 FLOOR := .venv-floor
+ROS := .venv-ros
 FLOOR_VERSIONS := .ci/ubuntu_24.04.txt
 # In the order that conftest.py gives: files of few tests are often long, and none of these comes
 # last so. Tests that wait for other processes leave room for a third worker on two cores.
 PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
 SUITE := $(PARALLEL) -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
-# These exchange blocks in real time and compute nothing; other tests of commands run nodes as well.
-MIDDLEWARE := --ignore=test/drivers --ignore=test/nodes --ignore=test/ros
-MIDDLEWARE += --ignore=test/cli/test_calibrate.py --ignore=test/cli/test_without_dds.py
+# These exchange blocks in real time and compute nothing; other tests of commands do so as well.
+EXCHANGES := --ignore=test/drivers --ignore=test/nodes --ignore=test/cli/test_calibrate.py
+# What starts nodes, and all that a command does otherwise where there is ROS. Each worker has a
+# domain of its own.
+ON_ROS := test/nodes test/drivers test/cli test/test_launch.py
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 # Tests start many processes, each of which would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-evidence check docs test-floor clean
+.PHONY: help demo test test-suite test-nodes test-ros test-evidence check docs test-floor clean
 
 help:
 	@echo "make demo           scan a simulated scanner without and with compensation; report in demo/"
-	@echo "make test           run the test suite of the product"
+	@echo "make test           run the test suite of the product, with the nodes where ROS can be had"
+	@echo "make test-ros       run the tests of nodes, drivers and commands on a ROS 2 made from wheels"
 	@echo "make test-evidence  run the tests of the benchmarks, and those of the product that take long"
 	@echo "make check          run the linter, the type checker and the examples, and build the site"
 	@echo "make docs           build the documentation site in site/"
@@ -32,8 +36,28 @@ help:
 demo: $(VENV)/ready
 	$(VENV)/bin/afm-scan demo --out demo
 
-test: $(VENV)/ready
+test: test-suite
+	@lacking=$$(scripts/jazzy_by_pip.sh --lacking); if [ -z "$$lacking" ]; then \
+	  $(MAKE) --no-print-directory test-nodes; \
+	else echo "make test: the tests of nodes were left out: this machine lacks $$lacking"; fi
+
+test-suite: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(SUITE)
+
+test-nodes: $(ROS)/ready
+	$(call pytest_on_ros,-m "not evidence" test/nodes)
+
+# Where ROS has them, the nodes are tested on its other usual middleware too.
+test-ros: $(ROS)/ready
+	$(call pytest_on_ros,-m "not evidence" $(ON_ROS))
+	$(call pytest_on_ros,-m evidence test/nodes)
+	@if $(ROS)/run python -c "import ctypes; ctypes.CDLL('librmw_cyclonedds_cpp.so')" 2>/dev/null; then \
+	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-m "not evidence" test/nodes); \
+	else echo "make test-ros: this ROS has no rmw_cyclonedds_cpp: the nodes were tested on Fast DDS alone"; fi
+
+# Tests that need ROS are skipped without it. pytest fails where it finds no test.
+pytest_on_ros = $(ROS)/run python -c "import rclpy, afm_scan_ros.msg" && \
+	  $(ROS)/run python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(1)
 
 test-evidence: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence test
@@ -49,10 +73,10 @@ docs: $(VENV)/ready
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet
 
 test-floor: $(FLOOR)/ready
-	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest --hypothesis-profile=floor $(MIDDLEWARE) $(SUITE)
+	NUMBA_CACHE_DIR=$(FLOOR)/numba $(FLOOR)/bin/python -m pytest --hypothesis-profile=floor $(EXCHANGES) $(SUITE)
 
 clean:
-	rm -rf $(VENV) $(FLOOR) demo build site *.egg-info
+	rm -rf $(VENV) $(FLOOR) $(ROS) .venv-uv demo build site *.egg-info
 
 # $(call environment,FOLDER,NEWEST MINOR VERSION OF PYTHON 3,FURTHER REQUIREMENTS)
 define environment
@@ -67,7 +91,7 @@ define environment
 	$$found -m venv $(1) || { echo "Python's venv module is incomplete;" \
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(1); exit 1; }
 	@echo "Installing afm_scan_ros and what it needs into $(1) (once, about a minute)"
-	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[dds,docs,test]" --editable benchmarks $(3)
+	@$(1)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[docs,test]" --editable benchmarks $(3)
 	@$(1)/bin/python -m compileall -q -j 0 afm_scan_ros benchmarks/afm_scan_bench
 	@touch $@
 endef
@@ -77,3 +101,9 @@ $(VENV)/ready: $(INPUTS)
 
 $(FLOOR)/ready: $(INPUTS) $(FLOOR_VERSIONS)
 	$(call environment,$(FLOOR),12,--constraint $(FLOOR_VERSIONS))
+
+# Files that are edited need no rebuild: they are linked.
+PACKAGE := $(shell find afm_scan_ros config launch msg -type d -not -name __pycache__) $(wildcard msg/*)
+$(ROS)/ready: $(INPUTS) $(FLOOR_VERSIONS) CMakeLists.txt scripts/jazzy_by_pip.sh $(PACKAGE)
+	scripts/jazzy_by_pip.sh $(ROS) --symlink-install
+	@touch $@

@@ -27,12 +27,13 @@ settings.load_profile("any_machine")
 
 OF_THE_USER = (
     *("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"),
-    *("CYCLONEDDS_URI", "AFM_SCAN_DOMAIN_ID"),
+    *("CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"),
+    "AFM_SCAN_DOMAIN_ID",
 )
 """Variables that would join a test with the user's own nodes."""
 
 
-WAITING = {"drivers", "nodes", "ros"}
+WAITING = {"drivers", "nodes"}
 """Folders of tests that mostly wait for other processes."""
 
 

@@ -40,6 +40,7 @@ setup(
         data("config/layouts"),
         data("config/changing"),
         data("config/plants"),
+        data("config/sros2"),
         data("launch"),
         (SHARE, ["package.xml"]),
     ],

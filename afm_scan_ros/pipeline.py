@@ -37,9 +37,11 @@ AHEAD = 0.05
 """Longest drive (s) given to the driver at once: it is output even if this process is gone."""
 IDLE = 0.01
 """Longest wait (s) before this process looks at everything again."""
-REAL = DriverTimeouts(silence=0.3, opening=60.0, answer=0.3)
-"""Of a scanner that moves in real time: the outputs are held for no longer after a silence."""
-SIMULATED = DriverTimeouts(silence=3.0, opening=60.0, answer=60.0)
+OPENING = 60.0
+"""Longest time (s) that a driver may take to open or to start."""
+HELD = 0.3
+"""Longest time (s) for which the outputs of a real scanner are held after a silence."""
+SIMULATED = DriverTimeouts(3.0, OPENING, OPENING, OPENING, real_time=False)
 """Of a simulation: only minutes are at stake, and a block may take long."""
 TRACEBACK = "Traceback (most recent call last)"
 UNWRITTEN = 500
@@ -76,7 +78,7 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
     """
     interrupted: list[int] = []
     with _handling(signal.default_int_handler), TemporaryFile("w+", encoding="utf-8") as output:
-        driver = DriverProcess(chain.driver, REAL if chain.time_scale else SIMULATED, output)
+        driver = DriverProcess(chain.driver, _timeouts(chain.time_scale), output)
         try:
             with _ramping_down(chain, driver):
                 _prepare(chain, driver, listener)
@@ -97,6 +99,13 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
             trouble = driver.close()
     if trouble:
         raise ScanError(f"{chain.scanner}: {trouble}")
+
+
+def _timeouts(time_scale: float) -> DriverTimeouts:
+    """Return how long the driver's process waits; at a slower pace drive comes less often."""
+    if not time_scale:
+        return SIMULATED
+    return DriverTimeouts(HELD, HELD * max(1.0, time_scale), OPENING, HELD, real_time=True)
 
 
 def _prepare(chain: ScanChain, driver: DriverProcess, listener: ScanListener) -> None:

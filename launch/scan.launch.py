@@ -131,10 +131,11 @@ def nodes(context: LaunchContext) -> list[Node]:
     consumers = ["inversion_compensator", scanner, "tracking_monitor", "scan_recorder"]
     true = ["true_displacement"] if given["scanner"] == "sim" else []
     recorded = ["desired_displacement", "drive_voltage", "achieved_displacement", *true]
+    time_scale = float(given["time_scale"])
+    pace = {"time_scale": time_scale, "real_time": time_scale > 0.0}
     source = instant | {
         "required_nodes": consumers + imagers + watches,
         "min_subscriptions": 3 + len(imagers),
-        "time_scale": float(given["time_scale"]),
     }
     parameters = {
         "scan_recorder": [{"bag": text(given["bag"]), "topics": recorded}],
@@ -159,7 +160,7 @@ def nodes(context: LaunchContext) -> list[Node]:
             package="afm_scan_ros",
             executable=name,
             namespace=given["namespace"],
-            parameters=[*values, {"real_time": float(given["time_scale"]) > 0.0}],
+            parameters=[*values, pace],
             output="screen",
             on_exit=judge,
         )

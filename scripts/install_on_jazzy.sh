@@ -4,12 +4,13 @@
 #   scripts/install_on_jazzy.sh [WORKSPACE]    (~/afm_scan_ws by default)
 #
 # What Ubuntu packages comes from apt, by rosdep. The rest goes into a virtual environment that sees
-# the system's packages. Run again, it brings the workspace up to date.
+# the system's packages. Run again, it brings the workspace up to date. ROS_SETUP names the setup.bash
+# of a ROS 2 in another place.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 workspace=${1:-$HOME/afm_scan_ws}
-ros=/opt/ros/jazzy/setup.bash
+ros=${ROS_SETUP:-/opt/ros/jazzy/setup.bash}
 from_pip=("mcap>=1.5" "numba>=0.59.0" "rosbags>=0.10")
 pip_keys=(mcap-ros2-support python3-rosbags-pip)
 

@@ -12,7 +12,8 @@ from rclpy.signals import SignalHandlerOptions
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, READY, TRUE
+from afm_scan_ros.nodes.peers import READY
+from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
 
 
 def found_scanner(names: Collection[str], longest: float) -> tuple[str, bool]:

@@ -50,6 +50,7 @@ from afm_scan_ros.report.learning import (
     taught_text,
 )
 from afm_scan_ros.report.table import show
+from afm_scan_ros.report.terminal import say
 
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement")
 TRUE = "true_displacement"
@@ -183,7 +184,7 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     try:
         for each in rounds_of(session, base, validation_specs(diagnosed), rounds, _diagnose):
             done.append(each)
-            click.echo(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
+            say(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
             write_diagnosis(
@@ -235,7 +236,7 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     save_model(out / "model.extended.yaml", model, head)
     show(final_text(done, failure))
     show(f"next: {step}" for step in next_steps(reported(done).diagnosis))
-    click.echo(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
+    say(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
 
 
 def _shortcoming(done: Round) -> str:
@@ -298,7 +299,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         for each in learning_scans(session, base, wanted, scans, limits):
             done.append(each)
             errors = ", ".join(f"{axis} {1e9 * each.errors[axis]:.1f} nm" for axis in AXES)
-            click.echo(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
+            say(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
     except (InputError, ScanError, KeyboardInterrupt) as error:
         if not done:
             raise
@@ -312,7 +313,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         taught = _taught(base, done, out, made)
         _write(out, done, taught, made, failure)
         show(taught_text(taught))
-    click.echo(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
+    say(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
     if isinstance(ended, KeyboardInterrupt):
         raise ended
     if failure:

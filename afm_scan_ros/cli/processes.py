@@ -150,7 +150,9 @@ class NodeProcess:
 
 def pace(time_scale: float) -> Mapping[str, object]:
     """Return the parameters of every node for the pace; without one, a block may take long."""
-    return {} if time_scale else {"real_time": False, "liveness_timeout_s": PATIENCE}
+    if time_scale:
+        return {"time_scale": time_scale}
+    return {"time_scale": 0.0, "real_time": False, "liveness_timeout_s": PATIENCE}
 
 
 def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:

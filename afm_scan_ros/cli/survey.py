@@ -24,6 +24,7 @@ from afm_scan_ros.core.survey.recording import Recording
 from afm_scan_ros.files.survey_files import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.report.survey import Survey, alert, page, summary
 from afm_scan_ros.report.table import show
+from afm_scan_ros.report.terminal import say
 
 PAGE = "survey.html"
 FALSE_ALARM = 0.01
@@ -172,7 +173,7 @@ def survey(
     found = _watched(surveyor, bags, watching) if watching else _surveyed(surveyor, bags)
     if found is None:
         return
-    click.echo(f"Table: {out / TABLE}. Report: {out / PAGE}.")
+    say(f"Table: {out / TABLE}. Report: {out / PAGE}.")
     if found.changes or found.failed:
         raise ScanError(
             f"instruments that changed: {len(found.changed)}; recordings that could not be"

@@ -11,7 +11,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.cli.progress import ScanProgress, showing
-from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING, SCAN_INFO
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 
 MOMENT = 0.1
 """Seconds of listening at once."""

@@ -162,7 +162,7 @@ class Reading:
     """Answer to a block of drive, at the same samples.
 
     ``sensor`` is what the sensor's converter gives (V). ``true`` is the displacement (m) without
-    noise, which only a simulation knows.
+    noise, which only a simulation knows. Any plain arrays of real numbers will do.
     """
 
     sensor: Trace
@@ -175,9 +175,9 @@ class Driver(ABC):
     The process makes it from the scanner's settings and from its own options, keyword arguments.
     It calls ``start`` once, which leaves the outputs at rest, then ``advance`` for each block. Once
     ``start`` has returned, it calls ``ramp_down`` at the end, whatever happened before. One thread
-    calls them, in which the watchdog waits too. A call that does not return in time ends the
-    process (``Waits``), and outputs that nobody ramps down stay up. So each wait for the
-    hardware needs a bound of its own.
+    calls them, in which the watchdog waits too. A call that returns late (``DriverTimeouts``) is
+    followed by ``ramp_down``. One that does not return ends the process, and outputs that nobody
+    ramps down stay up. So each wait for the hardware needs a bound of its own.
 
     ``InputError`` and ``ScanError`` are the errors to raise for what a user can mend; after any
     exception the outputs are ramped down and the scan has failed. The limits of the drive, the
@@ -222,13 +222,14 @@ def driver_class(name: str) -> type[Driver]:
         sys.path.append(str(Path.cwd()))
     module, _, kind = OURS.get(name, name).partition(":")
     try:
-        found = getattr(import_module(module), kind, None)
+        file = getattr(there := import_module(module), "__file__", None)
+        found = getattr(there, kind, None)
     except ModuleNotFoundError as error:
         raise InputError(f"driver {name}: {error}; {_install(name, error) or known}") from error
     except (ImportError, ValueError) as error:
         raise InputError(f"driver {name}: {error}; {known}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):
-        raise InputError(f"driver {name}: {module} has no such driver; {known}")
+        raise InputError(f"driver {name}: {file or module} has no such driver; {known}")
     return found
 
 

@@ -46,8 +46,9 @@ class DriverProcess:
     may be asked for at once; ``opened`` waits for what the driver says of its settings before.
     The driver's process has a session of its own: a signal to the group of this one does not reach
     it. It writes to ``output``, by default where this one does. ``latency_samples`` is, once it has
-    started, how much later than its displacement it reads. After an error ``outcome`` says why, and
-    whether the outputs are at rest.
+    started, how much later than its displacement it reads, and ``priority`` whether its process has
+    real-time priority, or why not. After an error ``outcome`` says why, and whether the outputs are
+    at rest.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class DriverProcess:
         self._waits, self._settings = waits, choice.settings
         self._asked = self._allowed = self._period = 0.0
         self._at_rest = True
-        self.latency_samples = 0
+        self.latency_samples, self.priority = 0, ""
         self.waiting = False
         self._block: Trace | None = None
         self._next_sign = 0.0
@@ -123,6 +124,7 @@ class DriverProcess:
         self.waiting = False
         if (block := self._block) is None:
             self.latency_samples = message.fields["latency_samples"]
+            self.priority = message.fields["priority"]
             return None
         first, rows = message.fields["first_sample"], iter(message.samples)
         pairs = zip(rows, rows, strict=True)
@@ -142,10 +144,12 @@ class DriverProcess:
     def ramp_down(self, why: str) -> str:
         """Bring the outputs to rest, end the driver, and return why and how, within seconds.
 
-        Where the driver has ended already, that is what is returned.
+        A block that is late may be answered within ENDING, and the ramp begins then. Where the
+        driver has ended already, that is what is returned.
         """
         latency = self.latency_samples * self._period
-        deadline = time.monotonic() + ramp_bound(self._settings, latency)
+        return_of_block = ENDING if self.waiting and self._block else 0.0
+        deadline = time.monotonic() + return_of_block + ramp_bound(self._settings, latency)
         with suppress(InputError, ScanError):
             self._send(Message(STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
@@ -218,8 +222,9 @@ class DriverProcess:
         if said["bad_input"] and self._block is None:
             self.outcome = reason
             raise InputError(reason)
-        if ramp is None:
-            self._end(f"{reason}; the ramp-down failed: the drive may not be at rest")
+        if isinstance(ramp, str):
+            self._at_rest = False
+            self._end(f"{reason}; {ramp}: the drive may not be at rest")
         self._at_rest = True
         moved = f"; drive ramped down to 0 V within {ramp:.3g} s" if self._block else ""
         self._end(f"{reason}{moved}")

@@ -1,12 +1,15 @@
 """A driver within its scanner's settings: limits, units, latency, and checks of its readings."""
 
+import math
+import reprlib
 from collections.abc import Mapping
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.drivers import (
     AxisSettings,
@@ -17,6 +20,7 @@ from afm_scan_ros.drivers import (
     open_driver,
     samples_in,
 )
+from afm_scan_ros.drivers.readings import checked
 
 LOST = "the sensor is lost: check its cable and its supply"
 
@@ -57,11 +61,6 @@ class SensorWatch:
                 self._judge(drive.first_sample + stop)
 
     def _refuse_out_of_range(self, axis: str, read: Array, drive: Trace) -> None:
-        if read.shape != drive.x.shape:
-            raise ScanError(
-                f"sample {drive.first_sample}, axis {axis}: the driver returned {read.size}"
-                f" readings for {drive.x.size} samples of drive"
-            )
         low, high = self._ranges[axis].sensor_low, self._ranges[axis].sensor_high
         if low < np.min(read) <= np.max(read) < high:  # NaN is not
             return
@@ -100,13 +99,6 @@ class SensorWatch:
         self._high = np.where(self._same, np.fmax(self._high, mean), np.nan)
 
 
-def _are_arrays(given: object) -> bool:
-    """Whether these are samples of both axes as arrays of real numbers."""
-    return isinstance(given, Trace) and all(
-        isinstance(each, np.ndarray) and each.dtype.kind in "fiu" for each in (given.x, given.y)
-    )
-
-
 @frozen
 class Displacement:
     """Displacement (m): as measured, and without noise where the driver knows that."""
@@ -136,7 +128,7 @@ class GuardedDriver:
     @property
     def knows_true(self) -> bool:
         """Whether each answer has a noise-free displacement."""
-        return self._driver.KNOWS_TRUE
+        return bool(self._driver.KNOWS_TRUE)
 
     @property
     def ramps_while_blocked(self) -> bool:
@@ -149,7 +141,10 @@ class GuardedDriver:
         Checks are compiled now, not while a block is due.
         """
         self._refuse(Trace(0, sample_period, np.zeros(2), np.zeros(2)))
-        late = self._settings.latency_samples + self._driver.buffered(sample_period)
+        buffered: object = self._driver.buffered(sample_period)
+        if not isinstance(buffered, Integral) or buffered < 0:
+            raise InputError(f"buffered of the driver returned {buffered!r}, and not samples")
+        late = self._settings.latency_samples + int(buffered)
         self.latency_samples = self._early = late
         self._watch = SensorWatch(self._settings, sample_period, late)
         self._driver.start(sample_period)
@@ -169,19 +164,22 @@ class GuardedDriver:
         return Displacement(Trace(read.first_sample, read.sample_period, x, y), true)
 
     def ramp_down(self) -> float:
-        """Ramp the outputs to rest at 0 V; return how long that took (s)."""
-        return self._driver.ramp_down()
+        """Ramp the outputs to rest at 0 V; return how long that took (s).
+
+        Raises ScanError where the driver does not say how long: it may not have ramped down.
+        """
+        taken: object = self._driver.ramp_down()
+        if not isinstance(taken, Real) or isinstance(taken, bool):
+            raise ScanError(f"ramp_down returned {reprlib.repr(taken)}, and not its duration in s")
+        if not 0.0 <= (duration := float(taken)) < math.inf:
+            raise ScanError(f"ramp_down returned {duration:g}, and not its duration in s")
+        return duration
 
     def _refuse(self, drive: Trace) -> None:
         self._settings.amplifier.limits.refuse_beyond(drive, self._before)
 
     def _answer(self, drive: Trace) -> Reading:
-        answer = self._driver.advance(drive)
-        if not isinstance(answer, Reading) or not _are_arrays(answer.sensor):
-            raise ScanError(
-                f"sample {drive.first_sample}: advance of the driver must return"
-                " Reading(Trace(...)), with the readings of the same samples as arrays of floats"
-            )
+        answer = checked(self._driver.advance(drive), drive, knows_true=self.knows_true)
         self._watch.check(drive, answer.sensor)
         return answer
 

@@ -1,6 +1,6 @@
 """The link between the ROS process and the driver's process, and how long each side waits.
 
-A message is two lengths, a header in JSON, and rows of float64 samples as they lie in memory.
+A message is two lengths, a header in JSON, and rows of float64 samples, one after the other.
 It goes over a pair of sockets.
 """
 
@@ -28,7 +28,7 @@ _LENGTHS = struct.Struct("=IIQ")  # of the header in bytes, rows, samples in a r
 
 @frozen(eq=False)
 class Message:
-    """A kind, values that JSON can hold, and samples of shape (rows, n)."""
+    """A kind, values that JSON can hold, and real numbers of shape (rows, n), sent as float64."""
 
     kind: str
     fields: Mapping[str, Any] = field(factory=dict)
@@ -57,10 +57,16 @@ class Link:
         return bool(self._arrivals.poll(1e3 * wait))
 
     def send(self, message: Message) -> None:
-        """Send a message; raises TimeoutError, or OSError where the other end is gone."""
+        """Send a message.
+
+        Raises TimeoutError, OSError where the other end is gone, and TypeError or ValueError for
+        samples that are no real numbers in rows, of which nothing is sent.
+        """
+        samples = message.samples.astype(np.float64, casting="same_kind", copy=False)
+        rows, count = samples.shape
         header = json.dumps({"kind": message.kind, **message.fields}).encode()
-        lengths = _LENGTHS.pack(len(header), *message.samples.shape)
-        self._socket.sendall(b"".join((lengths, header, message.samples.tobytes())))
+        lengths = _LENGTHS.pack(len(header), rows, count)
+        self._socket.sendall(b"".join((lengths, header, samples.tobytes())))
 
     def receive(self) -> Message:
         """Return the next message; raises TimeoutError, or EOFError where the other end is gone."""
@@ -90,21 +96,35 @@ class Link:
 
 
 ENDING = 3.0
-"""Longest time (s), beside the ramp itself, for the outputs to be at rest."""
+"""Longest time (s), beside the ramp itself, for the outputs to be at rest.
+
+A call of the driver that is late may still return within it, and is followed by the ramp. Then its
+process is killed, which holds the outputs where they are, but frees the device for its watchdog.
+"""
 
 
 @frozen
 class DriverTimeouts:
-    """Longest waits (s).
+    """Longest waits (s), and whether a scan runs in ``real_time``, so that its driver has priority.
 
-    After ``silence`` of the ROS side the outputs ramp down. ``opening`` bounds the driver's
-    constructor, and its ``start``. An answer to a block may come ``answer`` after the block and its
-    readings are due. A driver that takes longer hangs, and its process ends.
+    The outputs ramp down after ``silence`` of the ROS side, and, from the first block to the last,
+    where no more drive has come for ``starved`` since the last block would have been output: signs
+    of life do not count. ``opening`` bounds the driver's constructor, and its ``start``, which set
+    up hardware. An answer to a block may come ``answer`` after the block and its readings are due.
+
+    In real time the outputs are to be at rest within 0.5 s of a fault. The longest ramp of the
+    amplifier's settings, as 0.125 s from 5 V at 40 V/s, and some 0.05 s for the process to run
+    leave 0.3 s for ``silence``, ``starved`` and ``answer``. A driver's buffer bridges what is
+    shorter than itself. One longer than the waits does not lengthen them: the drive in it is output
+    before the ramp, and rest would come later still. Where a scan does not run in real time, the
+    outputs wait for computations, and the waits are those of a process that hangs.
     """
 
     silence: float
+    starved: float
     opening: float
     answer: float
+    real_time: bool
 
     def for_answer(self, block: Trace, latency_samples: int) -> float:
         """Longest time (s) that the driver may take for a block, with its late readings."""

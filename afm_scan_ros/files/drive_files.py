@@ -1,6 +1,5 @@
 """Drives as files for a lab's own converter: text, and numpy arrays, one pair a record."""
 
-import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Sampled, Waveform
 from afm_scan_ros.core.types import AXES, Array
-from afm_scan_ros.files.arrays import read_member
+from afm_scan_ros.files.arrays import open_archive, read_member
 
 DRIVE, PERIOD = "drive_v", "sample_period_s"
 BLOCK = 100_000
@@ -79,7 +78,7 @@ def read_drive(path: Path) -> Plan[Sampled]:
     Raises InputError naming the file where it holds none.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_archive(path) as archive:
             drive, period = (read_member(archive, f"{name}.npy") for name in (DRIVE, PERIOD))
     except Exception as error:  # whatever a damaged file makes zipfile and numpy run into
         raise InputError(

@@ -4,17 +4,21 @@ import time
 import traceback
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
+
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import BlockGuard, Outbox, ReceivedBlock, block_message
+from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox, ReceivedBlock, block_message
 from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
-from afm_scan_ros.ros import LifecycleNodeMixin, LifecycleState, Message, TransitionCallbackReturn
+from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 
 def min_subscriptions(readers: int, of: str = "") -> NodeParameter:
@@ -90,6 +94,8 @@ class BlockConsumer(ScanNode):
             return True
         if self.info is not None and self.state == READY:
             self.reason = self._hindrance()
+            if not self.reason and not self.ready:
+                self.pin_publishers()
             self.take_part(ready=not self.reason)
         now = time.monotonic()
         unsent = [outbox for outbox, _ in self._outputs.values() if not outbox.flush(now)]
@@ -134,15 +140,25 @@ class BlockConsumer(ScanNode):
         """Return how long the node has worked (s)."""
         return self.busy
 
-    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
-        """Take the next block of a topic; raises ScanError where it is not the expected one."""
+    def receive(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> None:
+        """Take the next block of a topic; raises ScanError where it is not the expected one.
+
+        ``number`` is that of the message among those of its publisher.
+        """
         if self.leaving:
             return
-        block = self.follow(topic, message)
+        if self.refuses():
+            why = self.reason or "is not ready"
+            raise ScanError(f"{topic.name}: a block came while this node {why}")
+        block = self.follow(topic, message, number)
         self.consume(topic, block, last=message.last)
         self.advance()
 
-    def follow(self, topic: NodeTopic, message: ReceivedBlock) -> Trace:
+    def refuses(self) -> bool:
+        """Return whether no block of the scan can be there yet: what came is another's."""
+        return self.state == READY and not self.ready
+
+    def follow(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> Trace:
         """Return the block if it is the expected one; raises ScanError otherwise."""
         info = self.scan
         if topic.name not in self._block_guards:
@@ -150,18 +166,23 @@ class BlockConsumer(ScanNode):
                 name: BlockGuard(name, info.scan_id, info.sample_period, info.total_samples)
                 for name in self._followed
             }
-        block = self._block_guards[topic.name].accept(message)
+        block = self._block_guards[topic.name].accept(message, number)
+        self.note_block(block.x.size)
         if self.state == READY:
             self.go(RUNNING)
         return block
 
     def advance(self) -> None:
-        """Report the sample up to which all topics are processed; done when all are complete."""
-        self.advance_to(min(guard.next_sample for guard in self._block_guards.values()))
+        """Report the sample up to which the node is finished; done when all topics are complete."""
+        self.advance_to(min(self._block_guards[name].next_sample for name in self.counted()))
         if all(guard.complete for guard in self._block_guards.values()):
             self.go(DONE)
 
-    def _meet(self, message: Message) -> None:
+    def counted(self) -> Sequence[str]:
+        """Return the topics whose samples are the node's progress."""
+        return self._followed
+
+    def _meet(self, message: Message, _: int) -> None:
         if self.info is not None:
             topic = self.resolve_topic_name(SCAN_INFO.name)
             both = f"scan '{message.scan_id}' during scan '{self.info.scan_id}'"
@@ -177,13 +198,8 @@ class BlockConsumer(ScanNode):
             for name, (outbox, readers) in self._outputs.items()
             if outbox.publisher.get_subscription_count() < readers
         ]
-        unpublished = [
-            f"waits for one publisher of {name}, not {count}"
-            for name in self.inputs
-            if (count := self.count_publishers(name)) != 1
-        ]
         unheard = [f"waits for the state of {name}" for name in self.peers.unheard_since(0.0)]
-        return next(iter(unread + unpublished + unheard), "")
+        return next(filter(None, [*unread, self.crowded(), *unheard]), "")
 
 
 class StreamReader(BlockConsumer):
@@ -197,7 +213,7 @@ class StreamReader(BlockConsumer):
     def __init__(self) -> None:
         super().__init__()
         self._source_was_there = False
-        self._early: list[tuple[NodeTopic, ReceivedBlock]] = []
+        self._early: list[tuple[NodeTopic, ReceivedBlock, int]] = []
         self._early_since = 0.0
 
     def follows_scan(self) -> bool:
@@ -222,21 +238,25 @@ class StreamReader(BlockConsumer):
             self.follow(*self._early[0])  # raises
         return super().step()
 
-    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
-        """Take the next block; a bag does not wait until the node is ready for the first."""
+    def refuses(self) -> bool:
+        """Return whether a block is another's; a bag does not wait until the node is ready."""
+        return self.follows_scan() and super().refuses()
+
+    def receive(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> None:
+        """Take the next block, or keep it until the scan is announced."""
         if self.info is None:
             self._early_since = self._early_since or time.monotonic()
-            self._early.append((topic, message))
+            self._early.append((topic, message, number))
             return
         while not self.leaving and self.prepares():
             pass
-        super().receive(topic, message)
+        super().receive(topic, message, number)
 
-    def _meet(self, message: Message) -> None:
-        super()._meet(message)
+    def _meet(self, message: Message, number: int) -> None:
+        super()._meet(message, number)
         early, self._early = self._early, []
-        for topic, block in early:
-            self.receive(topic, block)
+        for each in early:
+            self.receive(*each)
 
 
 AUTOSTART = NodeParameter(
@@ -257,6 +277,8 @@ class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
     def __init__(self) -> None:
         BlockConsumer.__init__(self)
         LifecycleNodeMixin.__init__(self)
+        changes = self._service_change_state
+        changes.callback = partial(_changed_if_possible, changes.callback)
         self.is_active = False
         self.reason = _CONFIGURE
 
@@ -279,11 +301,9 @@ class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
         """Wait until the node is active."""
         return self.is_active and super().step()
 
-    def receive(self, topic: NodeTopic, message: ReceivedBlock) -> None:
-        """Take the next block; raises ScanError for one that comes while the node is not active."""
-        if not self.is_active and not self.leaving:
-            raise ScanError(f"{topic.name}: a block came, but this node {self.reason}")
-        super().receive(topic, message)
+    def refuses(self) -> bool:
+        """Return whether a block is another's, as one is that comes to a node not active."""
+        return not self.is_active or super().refuses()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
         """Open the hardware."""
@@ -313,7 +333,8 @@ class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
     def destroy_node(self) -> None:
         """Close the hardware too."""
         try:
-            self.trigger_shutdown()
+            with suppress(RCLError):  # finalized already
+                self.trigger_shutdown()
         finally:
             self.close()
             super().destroy_node()
@@ -346,3 +367,14 @@ class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
         self.close()
         if not self.leaving:
             self.leave()
+
+
+def _changed_if_possible(
+    change: Callable[[Message, Message], Message], request: Message, response: Message
+) -> Message:
+    """Answer a transition that the state does not allow, at which rclpy would end the node."""
+    try:
+        return change(request, response)
+    except RCLError:
+        response.success = False
+        return response

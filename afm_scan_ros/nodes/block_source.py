@@ -12,8 +12,9 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.flow import MAX_MESSAGE_RATE, USUAL_WINDOW, block_size_at
 from afm_scan_ros.nodes.messages import Outbox, block_message, info_message
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import DONE, READY, RUNNING, SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 DOUBT = 0.3
 """Silence of a node, s, during which nothing begins and nothing is sent."""
@@ -31,6 +32,7 @@ class BlockSource(ScanNode):
         self._block_size = 0
         self._hindered = time.monotonic()
         self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
+        self._announced = False
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
             self.listen_to(own)
@@ -44,7 +46,10 @@ class BlockSource(ScanNode):
         return (self.get_name(), *self.settings["required_nodes"])
 
     def announce(self, info: ScanInfo) -> None:
-        """Make the scan known, with its window; raises InputError where it cannot be paced so."""
+        """State the scan, with its window; raises InputError where it cannot be paced so.
+
+        It is published by the first step, when the others hear that this node is there.
+        """
         given = self.settings
         self._block_size = given["block_size"] or block_size_at(info.sample_period)
         info = evolve(
@@ -57,10 +62,13 @@ class BlockSource(ScanNode):
         self.total = info.total_samples
         self.begin(info)
         self.ready = True
-        self._announcement.publish(info_message(info))
+        self.note_block(self._block_size)
 
     def step(self) -> bool:
         """Begin when all are ready, send what may be sent, end when all are done."""
+        if not self._announced:
+            self._announced = True
+            self._announcement.publish(info_message(self.scan))
         if self.state == READY:
             self._begin_when_possible()
         elif self.next_sample < self.total:
@@ -94,6 +102,8 @@ class BlockSource(ScanNode):
             self.reason = f"waits for the state of {', '.join(unheard)}"
         else:
             self._start = now
+            self.pin_publishers()
+            self.peers.begin(now)
             self.go(RUNNING)
 
     def _hindrance(self, now: float) -> str:
@@ -101,6 +111,8 @@ class BlockSource(ScanNode):
             return f"waits for {', '.join(waiting)}"
         if silent := self.peers.silence(self.peers.names, now, DOUBT):
             return f"waits, for {silent}"
+        if crowded := self.crowded():
+            return crowded
         readers = self._blocks.publisher.get_subscription_count()
         if readers < (wanted := self.settings["min_subscriptions"]):
             return f"waits for {wanted} readers of {self._topic.name}"

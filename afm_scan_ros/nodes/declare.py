@@ -5,18 +5,15 @@ import sys
 from collections.abc import Iterable
 from typing import Any
 
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.records import from_mapping
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import NodeParameter, Value, scan_spec_parameters
-from afm_scan_ros.ros import (
-    FloatingPointRange,
-    IntegerRange,
-    Message,
-    Node,
-    ParameterDescriptor,
-    ParameterException,
-)
 
 _LARGEST_INT = 2**31 - 1  # which a slider of rqt_reconfigure can hold
 _LARGEST_FLOAT = sys.float_info.max
@@ -25,6 +22,16 @@ _LARGEST_FLOAT = sys.float_info.max
 def declare(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
     """Declare parameters and return their values; raises InputError for one that does not fit."""
     return {parameter.name: _declare(node, parameter) for parameter in parameters}
+
+
+def undeclared(node: Node) -> list[str]:
+    """Names that the command line or a parameter file set and the node never declared."""
+    given = node._parameter_overrides  # noqa: SLF001 - rclpy has no public name for it
+    return sorted(
+        name
+        for name in given
+        if not name.startswith("qos_overrides.") and not node.has_parameter(name)
+    )
 
 
 def scan_spec(node: Node) -> ScanSpec:

@@ -1,19 +1,22 @@
 """Node: desired displacement in, through the inverse of the scanner's model, drive voltage out."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_inversion import ScanInversion
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
 from afm_scan_ros.nodes.parameters import INVERSION, MODEL_FILE, inversion_settings, model_of
-from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, RUNNING, NodeTopic, Report
+from afm_scan_ros.nodes.peers import RUNNING, Report
+from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 
 
 class InversionCompensator(BlockConsumer):
@@ -21,6 +24,13 @@ class InversionCompensator(BlockConsumer):
 
     NAME = "inversion_compensator"
     PARAMETERS = (MODEL_FILE, *INVERSION, min_subscriptions(2))
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Invert a moment of a scan by the default model."""
+        defaults = {each.name: each.default for each in (MODEL_FILE, *INVERSION)}
+        inversion = ScanInversion(model_of(defaults), ScanSpec(), inversion_settings(defaults))
+        list(inversion.desired(desired(ScanSpec(), 0, 2), last=False))
 
     def __init__(self) -> None:
         super().__init__()
@@ -65,6 +75,10 @@ class InversionCompensator(BlockConsumer):
         self._refuse_narrow_window(len(block.x))
         self._drive(self._inversion.desired(block, last=last))
 
+    def counted(self) -> Sequence[str]:
+        """Count what was desired: what was achieved waits for a scanner that may stand still."""
+        return (DESIRED.name,)
+
     def _drive(self, blocks: Iterable[Trace]) -> None:
         for drive in blocks:
             self.send(DRIVE, drive, last=self._inversion.is_last(drive))
@@ -77,7 +91,7 @@ class InversionCompensator(BlockConsumer):
         scanner = self._scanner() if line is not None else None
         if scanner is None or scanner.next_sample < self._inversion.driven:
             return
-        if time.monotonic() - self._moved_at > self.settings["liveness_timeout_s"]:
+        if time.monotonic() - self._moved_at > 0.5 * self.longest_standstill():
             raise ScanError(
                 f"the next line waits for the end of line {line}, which {scanner.node} has not"
                 f" read: feedback_latency_ms = {self.settings['feedback_latency_ms']:g} is less"

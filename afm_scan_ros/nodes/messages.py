@@ -3,18 +3,28 @@
 from array import array
 from collections import deque
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from attrs import asdict, define, field
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import MAX_BLOCK, LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.ros import Header, Image, Message, NodeState, Publisher, RCLError, TrackingError
-from afm_scan_ros.ros import MonitorSample as MonitorSampleMessage
-from afm_scan_ros.ros import ScanInfo as ScanInfoMessage
+from afm_scan_ros.msg import MonitorSample as MonitorSampleMessage
+from afm_scan_ros.msg import NodeState, TrackingError
+from afm_scan_ros.msg import ScanInfo as ScanInfoMessage
+
+Message: TypeAlias = Any
+"""Of a class that rosidl makes from a definition in ``msg/``."""
+
+NOT_TOLD = 2**64 - 1
+"""Number of a message where the middleware does not count them."""
 
 
 class ReceivedBlock(Protocol):
@@ -38,10 +48,13 @@ class BlockGuard:
         self.total_samples = total_samples
         self.next_sample = 0
         self.complete = False
+        self._number: int | None = None
 
-    def accept(self, block: ReceivedBlock) -> Trace:
+    def accept(self, block: ReceivedBlock, number: int) -> Trace:
         """Return the samples of the block that follows on the one before.
 
+        ``number`` is that of the message among those of its publisher, where DDS tells it: all
+        blocks are of one publisher.
         Raises ScanError naming the topic, the sample and what is wrong with it.
         """
         x, y = (np.asarray(samples, dtype=np.float64) for samples in (block.x, block.y))
@@ -49,6 +62,7 @@ class BlockGuard:
         self._check_size(x, y)
         self._check_place(block.first_sample, block.first_sample + len(x))
         self._check_numbers(x, y)
+        self._check_publisher(number)
         self.next_sample += len(x)
         self.complete = block.last
         return Trace(block.first_sample, self.sample_period, x, y)
@@ -87,6 +101,11 @@ class BlockGuard:
             for place in np.flatnonzero(~np.isfinite(samples)):
                 where = f"sample {self.next_sample + place}, {axis}"
                 self._refuse(f"{where}: {samples[place]} is not a finite number")
+
+    def _check_publisher(self, number: int) -> None:
+        if self._number is not None and number not in {self._number + 1, NOT_TOLD}:
+            self._refuse(f"the block at sample {self.next_sample} is of another publisher")
+        self._number = number
 
     def _refuse(self, why: str) -> None:
         raise ScanError(f"{self.topic}: {why}")

@@ -6,12 +6,16 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
 from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import predict
+from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.parameters import ADAPTATION, ALARMS, MODEL_FILE, model_of
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, RUNNING, NodeTopic
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
 
 class ResidualMonitor(StreamReader):
@@ -22,6 +26,12 @@ class ResidualMonitor(StreamReader):
 
     NAME = "residual_monitor"
     PARAMETERS = (MODEL_FILE, *ALARMS, *ADAPTATION, min_subscriptions(0))
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Predict a moment of a scan by the default model."""
+        model = model_of({MODEL_FILE.name: MODEL_FILE.default})
+        predict(model, desired(ScanSpec(), 0, 2))
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,27 +1,31 @@
 """Runs one node as a process: its loop, its signals and its exit status."""
 
+import os
 import signal
 import sys
 import time
 import traceback
+from collections.abc import Iterable
 from importlib import import_module
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes.declare import undeclared
+from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import state_message
+from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
-from afm_scan_ros.nodes.topics import FAILED, NODE_STATE, Diagnostics
-from afm_scan_ros.ros import (
-    Node,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
-    try_shutdown,
-    undeclared_parameters,
-    use_node_settings,
-    users_settings,
-)
+from afm_scan_ros.nodes.topics import NODE_STATE
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+NICENESS = -11
+"""Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
@@ -36,30 +40,47 @@ def node_class(name: str) -> type[ScanNode]:
 def run_node(name: str) -> int:
     """Run the node of a name until it ends; return its status.
 
-    0 is done, 2 bad input, 3 what was asked does not hold, 1 a fault of the program.
+    0 is done, 2 bad input, 3 what was asked does not hold, 1 a fault of the program. A signal ends
+    the process at once before the node joins ROS, which it does when it has compiled its loops.
     """
     kind = node_class(name)
+    kind.warm_up()
     caught = _catch_signals()
     try:
-        _join()
-        return _run(_made(kind), caught)
+        warnings = _join()
+        return _run(_made(kind, warnings), caught)
     except InputError as error:
         return _ended(kind.NAME, str(error), 2)
     finally:
-        try_shutdown()
+        rclpy.try_shutdown()
         _ignore_signals()
 
 
-def _made(kind: type[ScanNode]) -> ScanNode:
+def _made(kind: type[ScanNode], warnings: Iterable[str]) -> ScanNode:
     """Return a node; raises InputError, said in ROS too, where it cannot be made."""
     try:
         node = kind()
     except InputError as error:
         _report_refusal(kind.NAME, error)
         raise
-    warn_of_undeclared(node)
-    _warn_of_watermarks(node)
+    idle = (f"parameter {each} does nothing: {node.NAME} has none" for each in undeclared(node))
+    for warning in (*warnings, *idle):
+        node.get_logger().warning(warning)
+    if node.settings["real_time"]:
+        _take_priority(node)
     return node
+
+
+def _take_priority(node: ScanNode) -> None:
+    """Let a node that has to keep pace come before usual work, as an audio server does.
+
+    All its threads: those of DDS are there by now. A system may not permit it.
+    """
+    try:
+        for thread in Path("/proc/self/task").iterdir():
+            os.setpriority(os.PRIO_PROCESS, int(thread.name), NICENESS)
+    except OSError as error:
+        node.get_logger().info(f"no priority over other work: {error}")
 
 
 def _report_refusal(name: str, error: InputError) -> None:
@@ -73,26 +94,14 @@ def _report_refusal(name: str, error: InputError) -> None:
     node.destroy_node()
 
 
-def warn_of_undeclared(node: ScanNode) -> None:
-    """Log the parameters that were given and that the node does not have."""
-    for name in undeclared_parameters(node):
-        node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
-
-
-def _warn_of_watermarks(node: ScanNode) -> None:
-    if "Watermarks" in users_settings():
-        node.get_logger().warning(
-            "CYCLONEDDS_URI sets Watermarks, which replace those of this package: a viewer that is"
-            " stopped or killed may block a node and end the scan; remove them"
-        )
-
-
-def _join() -> None:
-    use_node_settings()
+def _join() -> list[str]:
+    """Join ROS; return what is to be logged of its middleware."""
+    warnings = middleware.prepare()
     try:
-        init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # rclpy's, for arguments that do not parse
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # for arguments that do not parse
         raise InputError(str(error)) from error
+    return warnings
 
 
 def _run(node: ScanNode, caught: list[str]) -> int:
@@ -122,19 +131,12 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
 
 
 def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
-    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has.
-
-    One message between two ticks would be too few: the states of a dozen nodes would queue up,
-    and a node would seem silent whose messages are there.
-    """
-    deadline = time.monotonic() + wait + IDLE
-    while time.monotonic() < deadline:
-        before = node.calls
-        executor.spin_once(timeout_sec=wait)
-        if node.calls == before:
-            node.all_heard()
-            return
+    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has."""
+    if node.take_messages(IDLE):
         wait = 0.0
+    else:
+        node.all_heard()
+    executor.spin_once(timeout_sec=wait)
 
 
 def _fail(node: ScanNode, error: Exception) -> None:

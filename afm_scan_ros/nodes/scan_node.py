@@ -6,29 +6,33 @@ from collections.abc import Callable, Iterable, Mapping
 from re import sub
 from threading import Event, RLock, Thread
 
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
+
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.declare import declare
-from afm_scan_ros.nodes.messages import AFTERLIFE, state_message
+from afm_scan_ros.nodes.diagnostics import Diagnostics
+from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.topics import (
-    DONE,
-    FAILED,
-    NODE_STATE,
-    READY,
-    RUNNING,
-    Diagnostics,
-    NodeTopic,
-    Peers,
-    Report,
-)
-from afm_scan_ros.ros import Message, Node, Publisher, Subscription
+from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
 
 HEARTBEAT = 0.05
+"""Seconds between two states of a node."""
+WATCH = 0.02
+"""Seconds between two looks at the other nodes."""
+SILENCE_AT_REST = 5.0
+"""Silence (s) of the source after which a node no longer waits for its scan: nothing moves yet."""
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
+NAMING = 0.2
+"""Longest time, s, in which the name of a publisher's node follows on the publisher."""
+_UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""What rmw calls a node until then."""
 
 COMMON = (
     NodeParameter(
@@ -38,9 +42,16 @@ COMMON = (
         "startup_timeout_s", 60.0, "Longest wait for the nodes of a scan to be ready", low=0.1
     ),
     NodeParameter(
+        "progress_timeout_s",
+        0.3,
+        "Scan time in which the slowest node may finish no sample until the drive ramps down",
+        low=0.1,
+    ),
+    NodeParameter("time_scale", 1.0, "Duration over scan time: 1 for real time", low=0.0),
+    NodeParameter(
         "real_time",
         default=True,
-        description="Whether a node that computes for long counts as silent; false in simulation",
+        description="Whether samples have to advance by the clock; false in simulation",
     ),
 )
 
@@ -57,7 +68,8 @@ class ScanNode(Node, ABC):
 
     def __init__(self) -> None:
         super().__init__(self.NAME)
-        self.settings = declare(self, (*COMMON, *self.PARAMETERS))
+        parameters = {each.name: each for each in (*COMMON, *self.PARAMETERS)}
+        self.settings = declare(self, parameters.values())
         self.info: ScanInfo | None = None
         self.peers = Peers()
         self.state = READY
@@ -67,19 +79,27 @@ class ScanNode(Node, ABC):
         self.ready = False
         self._reported = 0
         self._logged = ""
-        self._next_heartbeat = self._started = self._ticked = time.monotonic()
-        self._uncrowded = self._all_heard_at = self._started
+        self._next_watch = self._started = self._ticked = self._advanced = time.monotonic()
+        self._all_heard_at = self._started
         self.calls = 0
         self.busy = 0.0
         self._leave_at: float | None = None
         self._reporting = RLock()
         self._ended = Event()
         self._heartbeat = Thread(target=self._beat, daemon=True)
+        self._readers: list[tuple[Subscription, Callable[[Message, Mapping[str, int]], None]]] = []
+        self._publishers_of: dict[str, dict[bytes, str]] = {}
+        self._crowded_since = 0.0
+        self._longest_block = 0.0
         self.inputs: list[str] = []
         self._state_publisher = self.create_publisher(
             NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer
         )
         self._diagnostics = Diagnostics(self)
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Compute once what is slow the first time, before the node joins ROS."""
 
     @property
     def scan(self) -> ScanInfo:
@@ -109,31 +129,52 @@ class ScanNode(Node, ABC):
     def hear_others(self) -> None:
         """Begin to hear the others, by a reader made last: whoever is heard knows all of ours.
 
-        DDS tells of readers in the order in which they were made. Where no real scanner waits, a
-        thread reports from now on, so that a node is heard while a callback of its own computes.
+        DDS tells of readers in the order in which they were made. A thread reports from now on, so
+        that a node is heard while a callback of its own computes: whether it works is seen by its
+        progress.
         """
         self.subscribe(NODE_STATE, self._hear)
         reads, writes = (_named(each) for each in (self.subscriptions, self.publishers))
         name = self.get_fully_qualified_name()
         self.get_logger().info(f"{name} reads {reads}; it publishes {writes}")
-        if not self.settings["real_time"]:
-            self._heartbeat.start()
+        self._heartbeat.start()
 
     def subscribe(
-        self, topic: NodeTopic, callback: Callable[[Message], object], *, raw: bool = False
+        self, topic: NodeTopic, callback: Callable[[Message, int], object], *, raw: bool = False
     ) -> None:
         """Call back with each message of a topic, or with its bytes if ``raw``.
 
-        Counted in ``calls`` and ``busy`` (s).
+        And with its number among those of its publisher.
         """
 
-        def called(message: Message) -> None:
+        def called(message: Message, information: Mapping[str, int]) -> None:
             self.calls += 1
             began = time.monotonic()
-            callback(message)
+            callback(message, information["publication_sequence_number"])
             self.busy += time.monotonic() - began
 
-        self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
+        made = self.create_subscription(topic.kind, topic.name, called, topic.reader, raw=raw)
+        self._readers.append((made, called))
+
+    def take_messages(self, seconds: float) -> bool:
+        """Call back for messages that have arrived, for so long at most; return whether any had.
+
+        An executor builds its set of waitables anew for each message, which takes several times as
+        long as the message.
+        """
+        deadline, before = time.monotonic() + seconds, self.calls
+        busy = True
+        while busy and time.monotonic() < deadline:
+            busy = False
+            for subscription, callback in self._readers:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(
+                        subscription.msg_type, subscription.raw
+                    )
+                if taken is not None:
+                    callback(*taken)
+                    busy = True
+        return self.calls != before
 
     def all_heard(self) -> None:
         """Note that no message that has arrived waits to be heard."""
@@ -153,28 +194,54 @@ class ScanNode(Node, ABC):
         if now - self._ticked > INATTENTION:
             self.peers.listen_anew(now)
         self._ticked = now
-        if now >= self._next_heartbeat:
-            self._next_heartbeat = now + HEARTBEAT
-            if not self.leaving:
-                self.watch(now)
-            self.report()
+        if now >= self._next_watch and not self.leaving:
+            self._next_watch = now + WATCH
+            self.watch(now)
         return not self.leaving and self.step()
 
     def watch(self, now: float) -> None:
-        """Raise ScanError where another node failed, fell silent, or publishes in our place."""
-        timeout = self.settings["liveness_timeout_s"]
-        trouble = self.peers.failure() or self.silence(self.watched(), now, timeout)
+        """Raise ScanError where another node failed, fell silent, or publishes in our place.
+
+        And where samples stand still while the scan runs.
+        """
+        patience = self.patience() if self.state == RUNNING else SILENCE_AT_REST
+        trouble = self.peers.failure() or self.silence(self.watched(), now, patience)
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
+        if trouble is None and self.info is not None and self.state == RUNNING:
+            limits = self.longest_standstill(), self._longest_pause()
+            trouble = self.peers.standstill(self._own_report(), self.info, now, *limits)
         if trouble:
             raise ScanError(trouble)
         self._watch_publishers(now)
 
+    def patience(self) -> float:
+        """Return how long (s) another node may be silent while the scan runs."""
+        return float(self.settings["liveness_timeout_s"])
+
+    def longest_standstill(self) -> float:
+        """Return how long (s) samples may stand still: a block is output meanwhile."""
+        if not self.settings["real_time"]:
+            return float(self.settings["liveness_timeout_s"])
+        scale = max(1.0, self.settings["time_scale"])
+        return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
+
+    def _longest_pause(self) -> float:
+        """Return how long (s) a node that works may seem to stand: a block, and two heartbeats."""
+        if not self.settings["real_time"]:
+            return 0.5 * self.longest_standstill()
+        return float(self.settings["time_scale"]) * self._longest_block + 2.0 * HEARTBEAT
+
+    def _own_report(self) -> Report:
+        name, now = self.get_name(), time.monotonic()
+        return Report(
+            name, self.scan.scan_id, self.state, self.next_sample, self.reason, now, self._advanced
+        )
+
     def begin(self, info: ScanInfo) -> None:
         """Begin to take part in a scan: watch the others that do."""
-        others = (name for name in info.nodes if name != self.get_name())
         self.info, self._started = info, time.monotonic()
-        self.peers.follow(others, info.scan_id, self._started)
+        self.peers.follow(info.nodes, self.get_name(), info.scan_id, self._started)
 
     def listen_to(self, topic: NodeTopic) -> None:
         """Name a topic, read or written here, that one node alone is to publish."""
@@ -185,6 +252,10 @@ class ScanNode(Node, ABC):
         if self.ready != ready:
             self.ready = ready
             self.report()
+
+    def note_block(self, samples: int) -> None:
+        """Note the size of a block, for which samples stand still before they advance."""
+        self._longest_block = max(self._longest_block, samples * self.scan.sample_period)
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state and publish it."""
@@ -201,6 +272,8 @@ class ScanNode(Node, ABC):
 
     def advance_to(self, sample: int) -> None:
         """Record progress, and publish it before the source would wait for it."""
+        if sample != self.next_sample:
+            self._advanced = time.monotonic()
         self.next_sample = sample
         if self.info is not None and sample - self._reported >= self.info.window // 4:
             self.report()
@@ -255,6 +328,7 @@ class ScanNode(Node, ABC):
         self._ended.set()
         if self._heartbeat.is_alive():
             self._heartbeat.join()
+        self._readers.clear()
         super().destroy_node()
 
     def _log_news(self) -> None:
@@ -274,27 +348,42 @@ class ScanNode(Node, ABC):
         while not self._ended.wait(HEARTBEAT):
             self.report()
 
-    def _hear(self, message: Message) -> None:
+    def _hear(self, message: Message, _: int) -> None:
         if (m := message).node != self.get_name():
             now = time.monotonic()
             self.peers.hear(Report(m.node, m.scan_id, m.state, m.next_sample, m.reason, now))
 
-    def _watch_publishers(self, now: float) -> None:
-        """Allow a second publisher of a topic for as long as it may be one that was killed.
+    def crowded(self) -> str:
+        """Return which topic has not the one publisher that it should have, if any."""
+        counts = {name: self.count_publishers(name) for name in self.inputs}
+        wrong = (
+            f"waits for one publisher of {name}, not {count}"
+            for name, count in counts.items()
+            if count != 1
+        )
+        return next(wrong, "")
 
-        Each node drops that at a moment of its own. One that lives is refused by what it says.
+    def pin_publishers(self) -> None:
+        """Take the publishers that there are now as those of the scan."""
+        self._publishers_of = {topic: self._gids(topic) for topic in self.inputs}
+
+    def _gids(self, topic: str) -> dict[bytes, str]:
+        """Return the names of the nodes that publish a topic, by the identifiers of the writers.
+
+        By DDS's name of the topic, since rclpy remaps a name of ROS once more.
         """
-        counts = {topic: self.count_publishers(topic) for topic in self.inputs}
-        crowded = next((topic for topic, count in counts.items() if count > 1), None)
-        if crowded is None:
-            self._uncrowded = now
-            return
-        # rclpy remaps this name once more, which may lead elsewhere: the count is the one above.
-        found = self.get_publishers_info_by_topic(crowded)
-        types = sorted({each.topic_type for each in found})
-        if len(types) > 1 or now - self._uncrowded > AFTERLIFE:
-            of = f", of {' and '.join(types)}" if len(types) > 1 else ""
-            raise ScanError(f"{crowded} has {counts[crowded]} publishers{of}: stop all but one")
+        found = self.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True)
+        return {bytes(each.endpoint_gid): each.node_name for each in found}
+
+    def _watch_publishers(self, now: float) -> None:
+        """Raise ScanError where a topic of the scan has got another publisher, once it is named."""
+        for topic, pinned in self._publishers_of.items():
+            if self.count_publishers(topic) > len(pinned):
+                self._crowded_since = self._crowded_since or now
+                others = sorted({*self._gids(topic).values()} - {*pinned.values(), _UNNAMED})
+                if others or now - self._crowded_since > NAMING:
+                    named = f" ({', '.join(others)})" if others else ""
+                    raise ScanError(f"{topic} has another publisher{named}: stop all but one")
 
     def _late(self, now: float) -> str | None:
         timeout = self.settings["startup_timeout_s"]

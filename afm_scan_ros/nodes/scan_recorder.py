@@ -5,21 +5,23 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
+from rclpy.qos import DurabilityPolicy
+from rclpy.serialization import deserialize_message
+
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import BlockConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.topics import (
     BLOCKS,
-    FAILED,
     MODEL_RESIDUAL,
     MONITOR,
     SCAN_INFO,
     TRACKING_ERROR,
     NodeTopic,
 )
-from afm_scan_ros.ros import DurabilityPolicy, deserialize_message
 
 LINE_TOPICS = (TRACKING_ERROR, MODEL_RESIDUAL)
 """One message a line; they have no last one, and come in no order with the blocks."""
@@ -50,12 +52,12 @@ class ScanRecorder(BlockConsumer):
         for topic in (SCAN_INFO, MONITOR, *LINE_TOPICS, *topics):
             self._record(topic)
 
-    def receive_raw(self, topic: NodeTopic, name: str, data: bytes) -> None:
+    def receive_raw(self, topic: NodeTopic, name: str, data: bytes, number: int) -> None:
         """Write a message; follow its blocks like any consumer."""
         if self.leaving:
             return
         if topic.name in BLOCKS:
-            self.receive(topic, deserialize_message(data, topic.kind))
+            self.receive(topic, deserialize_message(data, topic.kind), number)
             self._recorded = True
         self._bag.write(name, time.time_ns(), data)
         self._received[topic.name] += 1

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import refuse_step
 from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice
@@ -16,11 +17,11 @@ from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.nodes.peers import DONE
 from afm_scan_ros.nodes.run import IDLE
-from afm_scan_ros.nodes.topics import ACHIEVED, DONE, DRIVE, RUNNING, TRUE, NodeTopic
+from afm_scan_ros.nodes.scan_node import HEARTBEAT
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
-LOOK = 0.02
-"""Seconds between two looks at the nodes upstream."""
 AHEAD = 0.05
 """Longest drive (s) given to the driver at once: it is output even if this process is gone."""
 
@@ -28,7 +29,7 @@ TIMEOUTS = (
     NodeParameter(
         "upstream_timeout_s",
         0.3,
-        "Time without a sign of an upstream node, or of this node, until the drive ramps down",
+        "Time without a sign of a node, or of this one, until the drive ramps down",
         low=0.2,
     ),
     NodeParameter(
@@ -37,6 +38,12 @@ TIMEOUTS = (
         "Longest time that the driver may take to open or to start, and where real_time is false"
         " for a block",
         low=0.1,
+    ),
+    NodeParameter(
+        "step_limit_v",
+        0.0,
+        "Largest change of the drive between samples that the scan needs; 0 for the slew limit's",
+        low=0.0,
     ),
 )
 
@@ -56,7 +63,7 @@ class ScannerNode(ManagedConsumer):
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
-        self._next_look = 0.0
+        self._before = dict.fromkeys(AXES, 0.0)
         self._asked = self._driving = 0.0
         self.read([DRIVE])
         self.autostart()
@@ -70,9 +77,11 @@ class ScannerNode(ManagedConsumer):
         given = self.settings
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
+        # The nodes know of whom the drive is missing, and speak first.
+        starved = upstream * max(1.0, given["time_scale"]) + HEARTBEAT
         real, simulated = (
-            DriverTimeouts(upstream, opening, upstream),
-            DriverTimeouts(liveness, opening, opening),
+            DriverTimeouts(upstream, starved, opening, upstream, real_time=True),
+            DriverTimeouts(liveness, opening, opening, opening, real_time=False),
         )
         waits = real if given["real_time"] else simulated
         self._driver = DriverProcess(self._choice, waits).opened()
@@ -98,6 +107,7 @@ class ScannerNode(ManagedConsumer):
         while self._driver.waiting:
             yield "waits for the driver to start"
             self._driver.answer(IDLE)
+        self.get_logger().info(f"driver: {self._driver.priority}")
         if 2 * (late := self._driver.latency_samples) > info.window:
             raise InputError(
                 f"{self._choice.where}: latency_samples = {late}, with the driver's buffer, is over"
@@ -108,7 +118,6 @@ class ScannerNode(ManagedConsumer):
     def step(self) -> bool:
         """Keep the driver running while no error is found."""
         if self._is_open:
-            self._watch_upstream()
             self._driver.show_life()
         if self.is_active:
             self._publish_answer()
@@ -116,7 +125,10 @@ class ScannerNode(ManagedConsumer):
         return super().step() or bool(self._moving)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
-        """Queue a block for the driver."""
+        """Queue a block for the driver; refuse a step that the scan cannot need."""
+        if largest := self.settings["step_limit_v"]:
+            refuse_step(block, self._before, largest)
+        self._before = {axis: float(block.axis(axis)[-1]) for axis in AXES}
         self._queue.append((block, last))
         self._more_may_come = True
 
@@ -131,6 +143,11 @@ class ScannerNode(ManagedConsumer):
             "driver": self._choice.driver,
             "buffer_samples": waiting,
         }
+
+    def patience(self) -> float:
+        """Return how long (s) another node may be silent while the drive is up."""
+        name = "upstream_timeout_s" if self.settings["real_time"] else "liveness_timeout_s"
+        return float(self.settings[name])
 
     def working_time(self) -> float:
         """Return how long the driver has worked (s)."""
@@ -173,19 +190,3 @@ class ScannerNode(ManagedConsumer):
         self.advance_to(end(moved[-1][0]))
         if last:
             self.go(DONE)
-
-    def _watch_upstream(self) -> None:
-        """Raise ScanError where the drive must be ramped down."""
-        now = time.monotonic()
-        if self.state != RUNNING or now < self._next_look:
-            return
-        self._next_look = now + LOOK
-        if not self.settings["real_time"]:
-            if failure := self.peers.failure():
-                raise ScanError(failure)
-            return  # a node that computes is heard late: ``watch`` judges silence
-        nodes = self.scan.nodes
-        upstream = nodes[: nodes.index(self.get_name())] if self.get_name() in nodes else nodes[:1]
-        timeout = self.settings["upstream_timeout_s"]
-        if trouble := self.peers.failure() or self.silence(upstream, now, timeout):
-            raise ScanError(trouble)

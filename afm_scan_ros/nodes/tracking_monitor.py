@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
+from rclpy._rclpy_pybind11 import RCLError
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineErrors, MonitorSamples
@@ -12,7 +13,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import ReceivedBlock, monitor_message, tracking_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
-from afm_scan_ros.ros import RCLError
 
 
 class TrackingMonitor(StreamReader):
@@ -49,7 +49,7 @@ class TrackingMonitor(StreamReader):
             with suppress(RCLError):
                 self._viewers.publish(monitor_message(self.scan, sample))
 
-    def _hear_drive(self, message: ReceivedBlock) -> None:
+    def _hear_drive(self, message: ReceivedBlock, _: int) -> None:
         if self.info is None or self.leaving or message.scan_id != self.info.scan_id:
             return
         while self.prepares():

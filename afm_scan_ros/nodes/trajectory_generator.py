@@ -1,6 +1,7 @@
 """Node: publishes the desired displacement of a scan."""
 
 from attrs import evolve
+from std_srvs.srv import Trigger
 
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.model import INVERSES
@@ -10,9 +11,10 @@ from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_source import BlockSource
 from afm_scan_ros.nodes.declare import scan_spec
 from afm_scan_ros.nodes.flow import FLOW, STOPPED, identity, taking_part
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import MODEL_FILE, NodeParameter, inverses_of, model_of
-from afm_scan_ros.nodes.topics import DESIRED, RUNNING
-from afm_scan_ros.ros import Message, Trigger
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import DESIRED
 
 
 class TrajectoryGenerator(BlockSource):

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from attrs import evolve
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
@@ -31,20 +32,26 @@ class Slow(SimulatedScanner):
 
 
 class Hanging(SimulatedScanner):
-    """Does not return from one of its calls, with the interpreter locked or not."""
-
-    HANG = 120
+    """Does not return from one of its calls for some seconds, the interpreter locked or not."""
 
     def __init__(
-        self, settings: ScannerSettings, call: str, *, locked: bool = False, **own: object
+        self,
+        settings: ScannerSettings,
+        call: str,
+        *,
+        seconds: int = 120,
+        locked: bool = False,
+        **own: object,
     ) -> None:
         super().__init__(settings, **own)
         Path(f"{own['output_log']}.pid").write_text(str(os.getpid()), "utf-8")
-        self._call, self._sleep = call, ctypes.PyDLL(None).sleep if locked else time.sleep
+        self._call, self._seconds = call, seconds
+        self._sleep = ctypes.PyDLL(None).sleep if locked else time.sleep
+        self.hang_in("__init__")
 
     def hang_in(self, call: str) -> None:
         if call == self._call:
-            self._sleep(self.HANG)
+            self._sleep(self._seconds)
 
     def start(self, sample_period: float) -> None:
         self.hang_in("start")
@@ -111,6 +118,44 @@ class Killed(SimulatedScanner):
 class NeverAtRest(SimulatedScanner):
     def ramp_down(self) -> float:
         raise OSError("no amplifier")
+
+
+class Exits(SimulatedScanner):
+    def ramp_down(self) -> float:
+        sys.exit("no amplifier")
+
+
+class SaysNothing(SimulatedScanner):
+    """Does not say how long its ramp took."""
+
+    def ramp_down(self) -> float:
+        super().ramp_down()
+        return None  # type: ignore[return-value] # what a lab may write
+
+
+class Loud(SimulatedScanner):
+    """Its error has lines of its own, and sequences that a terminal obeys."""
+
+    def advance(self, _: Trace) -> Reading:
+        raise ScanError("no card\n[INFO] the drive is at rest\x1b[2J\r")
+
+
+class LoudlyClosed(SimulatedScanner):
+    def __init__(self, *_: object, **__: object) -> None:
+        raise OSError("no card\n[INFO] ready")
+
+
+class Single(SimulatedScanner):
+    """Returns readings as its card does, in single precision."""
+
+    def advance(self, drive: Trace) -> Reading:
+        moved = super().advance(drive)
+        return Reading(
+            *(
+                evolve(each, x=np.float32(each.x), y=np.float32(each.y))
+                for each in (moved.sensor, moved.true)
+            )
+        )
 
 
 class Unlogged(SimulatedScanner):

@@ -131,9 +131,8 @@ def test_a_server_that_does_not_answer_is_named_and_the_drive_ramps_down_meanwhi
 ) -> None:
     with twin(tmp_path, "--fault", "hang", str(FAULT_AT)) as server:
         choice = load_settings("nidaqmx", settings_file(tmp_path, server))
-        driver = DriverProcess(
-            choice, DriverTimeouts(silence=60.0, opening=60.0, answer=0.5)
-        ).opened()
+        waits = DriverTimeouts(60.0, 60.0, 60.0, answer=0.5, real_time=False)
+        driver = DriverProcess(choice, waits).opened()
         driver.start(PERIOD)
         assert driver.answer(60.0) is None
         with pytest.raises(ScanError) as raised:

@@ -1,9 +1,14 @@
-"""A DDS domain of the tests' own, on the loopback and without multicast; a small scan."""
+"""A domain of the tests' own, on this machine alone; a small scan; all needs ROS."""
 
 import os
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
+
+from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
 
 SPEC = """\
 /**/trajectory_generator:
@@ -17,15 +22,33 @@ SPEC = """\
     block_size: 500
     window: 5000
 """
+PATIENT = {"liveness_timeout_s": 5.0, "progress_timeout_s": 5.0}
+DRIVING = {"upstream_timeout_s": 5.0}
+"""Parameters of nodes, and of those that drive a scanner."""
+
+
+class WithoutRos(pytest.Module):
+    """A file of tests that cannot be imported."""
+
+    def collect(self) -> NoReturn:
+        """Skip all of it."""
+        pytest.skip("needs rclpy: make test-ros")
+
+
+if find_spec("rclpy") is None:
+
+    def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> WithoutRos:
+        """Import no file of tests."""
+        made: WithoutRos = WithoutRos.from_parent(parent, path=module_path)
+        return made
 
 
 @pytest.fixture(autouse=True)
 def domain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Share a domain with the nodes that a test starts, and with nobody else."""
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")  # two that run at once never meet
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + 3 * (os.getpid() % 6) + int(worker[2:]) % 3))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + 4 * (os.getppid() % 25) + int(worker[2:]) % 4))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
 
 
 @pytest.fixture
@@ -34,3 +57,23 @@ def spec(tmp_path: Path) -> Path:
     path = tmp_path / "scan.yaml"
     path.write_text(SPEC, "utf-8")
     return path
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., NodeProcess]]:
+    """Return a function that starts a node by name; it ends with the test.
+
+    Unless told otherwise it bears other work of the computer for seconds.
+    """
+    started: list[NodeProcess] = []
+
+    def run(name: str, file: Path | None = None, **given: object) -> NodeProcess:
+        patient = PATIENT | (DRIVING if name in ("piezoscanner_sim", "scanner_driver") else {})
+        started.append(NodeProcess.start(NodeCommand(name, patient | given, file)))
+        return started[-1]
+
+    yield run
+    for node in started:
+        node.process.kill()
+        node.process.communicate()
+        node.output.close()

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import MAX_BLOCK
-from afm_scan_ros.nodes.messages import BlockGuard
+from afm_scan_ros.nodes.messages import NOT_TOLD, BlockGuard
 
 TOTAL = 60
 PERIOD = 1e-4
@@ -30,11 +30,11 @@ def guard(total: int = TOTAL) -> BlockGuard:
 cuts = st.sets(st.integers(1, TOTAL - 1)).map(lambda inner: [0, *sorted(inner), TOTAL])
 
 
-@given(cuts)
-@settings(deadline=None)
-def test_any_cut_of_a_scan_comes_back_whole(edges: list[int]) -> None:
+@given(cuts, st.integers(0, 2**63))
+def test_any_cut_of_a_scan_comes_back_whole(edges: list[int], first: int) -> None:
     watched = guard()
-    parts = [watched.accept(block(a, b - a, last=b == TOTAL)) for a, b in pairwise(edges)]
+    blocks = [block(a, b - a, last=b == TOTAL) for a, b in pairwise(edges)]
+    parts = [watched.accept(each, first + index) for index, each in enumerate(blocks)]
     assert np.array_equal(np.concatenate([part.x for part in parts]), np.arange(TOTAL))
     assert [part.first_sample for part in parts] == edges[:-1]
     assert watched.complete
@@ -43,11 +43,10 @@ def test_any_cut_of_a_scan_comes_back_whole(edges: list[int]) -> None:
 
 def accept(watched: BlockGuard, blocks: Iterable[SimpleNamespace]) -> None:
     for one in blocks:
-        watched.accept(one)
+        watched.accept(one, NOT_TOLD)
 
 
 @given(cuts.filter(lambda edges: len(edges) > 2), st.data())
-@settings(deadline=None)
 def test_a_lost_block_is_missed_by_the_next(edges: list[int], data: st.DataObject) -> None:
     blocks = [block(a, b - a) for a, b in pairwise(edges)]
     at = data.draw(st.integers(0, len(blocks) - 2))
@@ -59,7 +58,6 @@ def test_a_lost_block_is_missed_by_the_next(edges: list[int], data: st.DataObjec
 
 
 @given(cuts, st.data())
-@settings(deadline=None)
 def test_a_repeated_block_is_refused(edges: list[int], data: st.DataObject) -> None:
     blocks = [block(a, b - a) for a, b in pairwise(edges)]
     at = data.draw(st.integers(0, len(blocks) - 1))
@@ -84,24 +82,34 @@ def test_a_repeated_block_is_refused(edges: list[int], data: st.DataObject) -> N
 )
 def test_what_is_wrong_is_named(wrong: dict[str, object], named: str) -> None:
     watched = guard()
-    watched.accept(block(0, 10))
+    watched.accept(block(0, 10), 1)
     with pytest.raises(ScanError, match=named):
-        watched.accept(block(10, 5, **wrong))
+        watched.accept(block(10, 5, **wrong), 2)
     assert watched.next_sample == 10
 
 
 def test_numbers_are_taken_however_large() -> None:
-    taken = guard().accept(block(0, 3, x=[1e308, -1e308, 1e308], y=[1e308, 1e308, -1e308]))
+    taken = guard().accept(block(0, 3, x=[1e308, -1e308, 1e308], y=[1e308, 1e308, -1e308]), 1)
     assert list(taken.x) == [1e308, -1e308, 1e308]
 
 
 def test_nothing_follows_the_last_block() -> None:
     watched = guard()
-    watched.accept(block(0, 10, last=True))
+    watched.accept(block(0, 10, last=True), 1)
     with pytest.raises(ScanError, match="a block at sample 10 came after the scan's last block"):
-        watched.accept(block(10, 5))
+        watched.accept(block(10, 5), 2)
 
 
 def test_nothing_lies_beyond_the_scan() -> None:
     with pytest.raises(ScanError, match="sample 60 is beyond the 60 of the scan"):
-        guard().accept(block(0, TOTAL + 1))
+        guard().accept(block(0, TOTAL + 1), 1)
+
+
+@given(st.integers(0, 2**63), st.integers(-5, 5).filter(lambda step: step != 1))
+def test_a_block_of_another_publisher_is_refused_whatever_it_holds(number: int, step: int) -> None:
+    """Each publisher numbers its messages; the forged block below is the very one that is due."""
+    watched = guard()
+    watched.accept(block(0, 10), number)
+    with pytest.raises(ScanError, match="the block at sample 10 is of another publisher"):
+        watched.accept(block(10, 5), number + step)
+    assert watched.next_sample == 10

@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.streams import MAX_BLOCK
 from afm_scan_ros.nodes.flow import LEAST_BLOCK, USUAL_RATE, block_size_at
 from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
+from helpers.ros import joined
 
 Generate = Callable[..., TrajectoryGenerator]
 
@@ -37,17 +38,15 @@ def test_round_rates_have_round_blocks(rate: float, size: int) -> None:
 def generate() -> Iterator[Generate]:
     """Return a function that makes a generator, at 20 kHz by default."""
 
-    def made(**given: object) -> TrajectoryGenerator:
-        words = [word for name, value in given.items() for word in ("-p", f"{name}:={value}")]
-        ros.init(args=["--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO)
-        nodes.append(TrajectoryGenerator())
-        return nodes[-1]
+    with ExitStack() as ended:
 
-    nodes: list[TrajectoryGenerator] = []
-    yield made
-    for node in nodes:
-        node.destroy_node()
-    ros.try_shutdown()
+        def made(**given: object) -> TrajectoryGenerator:
+            ended.enter_context(joined(**given))
+            node = TrajectoryGenerator()
+            ended.callback(node.destroy_node)
+            return node
+
+        yield made
 
 
 @pytest.mark.parametrize(

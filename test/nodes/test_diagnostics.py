@@ -6,17 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
 
-from afm_scan_ros import ros
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader
-from afm_scan_ros.nodes.messages import block_message
-from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, PERIOD, RUNNING, NodeTopic
+from afm_scan_ros.nodes.diagnostics import PERIOD
+from afm_scan_ros.nodes.messages import Message, block_message
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, NodeTopic
+from helpers.ros import PATIENCE, joined, publisher, until
 
-PATIENCE = 60.0
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))
 
 
@@ -33,37 +36,31 @@ class Reader(StreamReader):
         time.sleep(0.01)
 
 
-class Operator(ros.Node):
+class Operator(Node):
     """Keeps the last status of each node, and how many there were."""
 
     def __init__(self) -> None:
         super().__init__("operator")
-        self.last: dict[str, ros.Message] = {}
+        self.last: dict[str, Message] = {}
         self.count = 0
         topic = DIAGNOSTICS
         self.create_subscription(topic.kind, topic.name, self._hear, topic.reader)
-        self._executor = ros.SingleThreadedExecutor()
-        self._executor.add_node(self)
 
-    def _hear(self, message: ros.Message) -> None:
+    def _hear(self, message: Message) -> None:
         self.count += 1
         assert abs(message.header.stamp.sec - time.time()) < PATIENCE
         self.last.update({status.name: status for status in message.status})
 
     def until(self, holds: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not holds():
-            assert time.monotonic() < deadline, self.last
-            self._executor.spin_once(timeout_sec=0.05)
+        until(holds, self)
 
 
 @pytest.fixture
 def operator() -> Iterator[Operator]:
-    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    made = Operator()
-    yield made
-    made.destroy_node()
-    ros.shutdown()
+    with joined():
+        made = Operator()
+        yield made
+        made.destroy_node()
 
 
 @pytest.fixture
@@ -75,8 +72,8 @@ def reader(operator: Operator) -> Iterator[Reader]:
 
 
 def test_a_node_says_how_it_is(operator: Operator, reader: Reader) -> None:
-    name, status = "slow_reader: scan", ros.DiagnosticStatus
-    operator.until(lambda: reader.tick() or name in operator.last)
+    name, status = "slow_reader: scan", DiagnosticStatus
+    operator.until(lambda: reader.report() or name in operator.last)
     said = operator.last[name]
     assert (said.level, said.message, list(said.values)) == (
         status.OK,
@@ -85,12 +82,10 @@ def test_a_node_says_how_it_is(operator: Operator, reader: Reader) -> None:
     )
     reader.begin(INFO)
     block = Trace(0, INFO.sample_period, np.zeros(500), np.zeros(500))
-    publisher = operator.create_publisher(DESIRED.kind, DESIRED.name, DESIRED.writer)
-    publisher.publish(block_message(DESIRED.kind, INFO, block, last=False))
-    hearing = ros.SingleThreadedExecutor()
-    hearing.add_node(reader)
-    while reader.next_sample == 0:
-        hearing.spin_once(timeout_sec=PATIENCE)
+    blocks = publisher(operator, DESIRED)
+    until(blocks.get_subscription_count, operator)
+    blocks.publish(block_message(DESIRED.kind, INFO, block, last=False))
+    until(lambda: reader.next_sample, reader)
     reader.go(RUNNING, "an alarm")
     operator.until(lambda: operator.last[name].level == status.WARN)
     values = {each.key: each.value for each in operator.last[name].values}
@@ -101,27 +96,22 @@ def test_a_node_says_how_it_is(operator: Operator, reader: Reader) -> None:
     reader.fail(ScanError("it broke"))
     operator.until(lambda: operator.last[name].level == status.ERROR)
     assert operator.last[name].message == "failed: it broke"
-    hearing.shutdown()
 
 
 def test_nothing_new_is_said_once_a_second(operator: Operator, reader: Reader) -> None:
     reader.report()
     operator.until(lambda: operator.count == 1)
     began = time.monotonic()
-    while operator.count < 3:
-        reader.report()
-        operator._executor.spin_once(timeout_sec=0.01)  # noqa: SLF001 - the test's own
-        assert time.monotonic() < began + PATIENCE
+    operator.until(lambda: reader.report() or operator.count == 3)
     assert time.monotonic() - began >= PERIOD
 
 
-def test_a_node_that_cannot_be_made_says_why(operator: Operator, tmp_path: Path) -> None:
-    command = NodeCommand("piezoscanner_sim", {"plant_file": str(tmp_path / "none.yaml")})
-    node = NodeProcess.start(command)
+def test_a_node_that_cannot_be_made_says_why(
+    operator: Operator, start: Callable[..., NodeProcess], tmp_path: Path
+) -> None:
+    node = start("piezoscanner_sim", plant_file=str(tmp_path / "none.yaml"))
     operator.until(lambda: "piezoscanner_sim: scan" in operator.last)
     said = operator.last["piezoscanner_sim: scan"]
-    assert said.level == ros.DiagnosticStatus.ERROR
+    assert said.level == DiagnosticStatus.ERROR
     assert "none.yaml" in said.message
     assert node.process.wait(PATIENCE) == 2
-    node.process.communicate()
-    node.output.close()

@@ -1,56 +1,39 @@
 """The scanner's node is managed as any of ROS: by its services, and safe whatever it is told."""
 
-import time
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from lifecycle_msgs.msg import Transition, TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 
-from afm_scan_ros import ros
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
-from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.messages import Message, block_message
+from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
-from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, FAILED, NODE_STATE
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
+from helpers.ros import PATIENCE, joined, until
 
-if TYPE_CHECKING or find_spec("rclpy") is None:
-    from afm_scan_ros.ros.cyclone.lifecycle import (
-        ChangeState,
-        GetAvailableStates,
-        GetAvailableTransitions,
-        GetState,
-        Transition,
-        TransitionEvent,
-    )
-else:
-    from lifecycle_msgs.msg import Transition, TransitionEvent
-    from lifecycle_msgs.srv import (
-        ChangeState,
-        GetAvailableStates,
-        GetAvailableTransitions,
-        GetState,
-    )
-
-PATIENCE = 60.0
 EVIDENCE = pytest.mark.evidence
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))
 NAME = "piezoscanner_sim"
 
 
-class Operator(ros.Node):
+class Operator(Node):
     """Manages the scanner as ``ros2 lifecycle`` does, and hears of its states."""
 
     def __init__(self) -> None:
         super().__init__("operator")
-        self.said: dict[str, ros.Message] = {}
+        self.said: dict[str, Message] = {}
         self.goals: list[str] = []
         topic = NODE_STATE
         self.create_subscription(topic.kind, topic.name, self._hear, topic.reader)
@@ -60,16 +43,12 @@ class Operator(ros.Node):
             lambda message: self.goals.append(message.goal_state.label),
             10,
         )
-        self._executor = ros.SingleThreadedExecutor()
-        self._executor.add_node(self)
+        self.beside: list[Node] = []
 
-    def listen_too(self, node: ros.Node) -> None:
-        self._executor.add_node(node)
-
-    def _hear(self, message: ros.Message) -> None:
+    def _hear(self, message: Message) -> None:
         self.said[message.node] = message
 
-    def call(self, service: str, kind: type, **fields: object) -> ros.Message:
+    def call(self, service: str, kind: type, **fields: object) -> Message:
         client = self.create_client(kind, f"{NAME}/{service}")
         self.until(client.service_is_ready)
         future = client.call_async(kind.Request(**fields))
@@ -91,41 +70,19 @@ class Operator(ros.Node):
         return str(self.said[node].reason) if node in self.said else ""
 
     def until(self, holds: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not holds():
-            assert time.monotonic() < deadline, self.said
-            self._executor.spin_once(timeout_sec=0.05)
+        until(holds, self, *self.beside)
 
 
 @pytest.fixture
 def operator() -> Iterator[Operator]:
     """Nodes of this process wait to be configured; those that are started need not."""
-    words = ["test", "--ros-args", "-p", "autostart:=false"]
-    ros.init(args=words, signal_handler_options=ros.SignalHandlerOptions.NO)
-    made = Operator()
-    yield made
-    made.destroy_node()
-    ros.shutdown()
+    with joined(autostart=False):
+        made = Operator()
+        yield made
+        made.destroy_node()
 
 
 Start = Callable[..., NodeProcess]
-
-
-@pytest.fixture
-def start() -> Iterator[Start]:
-    """Return a function that starts a node."""
-    started: list[NodeProcess] = []
-
-    def run(name: str, file: Path | None = None, **given: object) -> NodeProcess:
-        patient = {"liveness_timeout_s": 5.0, **given}
-        started.append(NodeProcess.start(NodeCommand(name, patient, file)))
-        return started[-1]
-
-    yield run
-    for node in started:
-        node.process.kill()
-        node.process.communicate()
-        node.output.close()
 
 
 def test_a_scan_by_hand_is_the_same_to_the_bit(
@@ -133,7 +90,7 @@ def test_a_scan_by_hand_is_the_same_to_the_bit(
 ) -> None:
     """The other nodes wait for the scanner, which opens its driver twice."""
     nodes = [
-        start(NAME, autostart=False, upstream_timeout_s=5.0),
+        start(NAME, autostart=False),
         start("scan_recorder", bag=str(tmp_path / "bag")),
         start("inversion_compensator"),
         start("trajectory_generator", spec, time_scale=0.2),
@@ -164,7 +121,7 @@ def test_a_scan_by_hand_is_the_same_to_the_bit(
 def test_a_scanner_that_is_deactivated_ramps_down_and_ends_the_scan(
     operator: Operator, start: Start, spec: Path, tmp_path: Path, label: str
 ) -> None:
-    scanner = start(NAME, upstream_timeout_s=5.0)
+    scanner = start(NAME)
     start("scan_recorder", bag=str(tmp_path / "bag"))
     start("inversion_compensator")
     source = start("trajectory_generator", spec, time_scale=100.0)
@@ -186,13 +143,34 @@ class Faulty(PiezoscannerSim):
 
 def test_an_error_in_a_transition_ends_the_node(operator: Operator) -> None:
     node = Faulty()
+    operator.beside.append(node)
     operator.until(lambda: operator.count_publishers(f"/{NAME}/transition_event") == 1)
-    node.trigger_configure()
+    assert not operator.change("configure")
     assert (node.state, node.status, node.leaving) == (FAILED, 1, True)
     assert node.reason == "RuntimeError: a fault of the program"
-    assert node.trigger_shutdown() is None  # finalized already
     operator.until(lambda: operator.goals == ["configuring", "errorprocessing", "finalized"])
-    node.destroy_node()
+    node.destroy_node()  # shut down already
+
+
+def test_a_node_that_is_shut_down_ends_well(operator: Operator, start: Start) -> None:
+    node = start(NAME)
+    operator.until(lambda: operator.reason() == "waits for scan_info")
+    assert operator.state() == "active"
+    assert operator.change("shutdown")
+    assert node.process.wait(PATIENCE) == 0
+    assert "Traceback" not in node.ended().traceback
+
+
+def test_a_transition_that_is_impossible_keeps_the_node_alive(
+    operator: Operator, start: Start
+) -> None:
+    """rclpy by itself raises, which would end it."""
+    node = start(NAME)
+    operator.until(lambda: operator.reason() == "waits for scan_info")
+    for label in ("configure", "activate", "cleanup", "nonsense"):
+        assert not operator.change(label)
+    assert operator.state() == "active"
+    assert node.process.poll() is None
 
 
 def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) -> None:
@@ -201,14 +179,14 @@ def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) 
     node.begin(INFO)
     block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
     with pytest.raises(ScanError, match=r"^drive_voltage: a block came, .* to be configured$"):
-        node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False))
+        node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False), 1)
     node.destroy_node()
     assert (node.state, node.reason) == (FAILED, "deactivated at sample 0")
 
 
 def test_the_states_and_services_are_those_of_ros(operator: Operator) -> None:
     node = PiezoscannerSim()
-    operator.listen_too(node)
+    operator.beside.append(node)
     assert operator.change("configure")
     assert operator.change("activate")
     assert operator.state() == "active"

@@ -1,35 +1,39 @@
 """Parameters: a scan's are ScanSpec's, files give what is declared, and the rest is refused."""
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib import import_module
 
 import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 
-from afm_scan_ros import ros
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.nodes import NODES
 from afm_scan_ros.nodes.declare import declare, scan_spec
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import NodeParameter, inverses_of, scan_spec_parameters
 from afm_scan_ros.nodes.scan_node import COMMON, ScanNode
+from helpers.ros import joined
 
-Start = Callable[..., ros.Node]
+Start = Callable[..., Node]
 
 
 @pytest.fixture
 def start() -> Iterator[Start]:
     """Return a function that makes a node for which parameters were given."""
 
-    def make(*given: str) -> ros.Node:
-        words = [word for pair in given for word in ("-p", pair)]
-        ros.init(
-            args=["test", "--ros-args", *words], signal_handler_options=ros.SignalHandlerOptions.NO
-        )
-        return ros.Node("tested")
+    with ExitStack() as ended:
 
-    yield make
-    ros.try_shutdown()
+        def make(*given: str) -> Node:
+            ended.enter_context(joined(*given))
+            node = Node("tested")
+            ended.callback(node.destroy_node)
+            return node
+
+        yield make
 
 
 def kind_of(name: str) -> type[ScanNode]:
@@ -89,14 +93,14 @@ def test_what_does_not_fit_is_refused_by_name(start: Start, given: str, named: s
 
 def test_a_slider_can_hold_every_range(monkeypatch: pytest.MonkeyPatch, start: Start) -> None:
     """That of rqt_reconfigure has 32 bits; what is fixed when a node starts is read only."""
-    described = []
+    described, node = [], start()
 
-    def note(_: ros.Node, name: str, value: object, descriptor: ros.Message) -> ros.Parameter:
+    def note(_: Node, name: str, value: object, descriptor: Message) -> Parameter:
         described.append((value, descriptor))
-        return ros.Parameter(name, value=value)
+        return Parameter(name, value=value)
 
-    monkeypatch.setattr(ros.Node, "declare_parameter", note)
-    declare(start(), [each for name in NODES for each in parameters_of(name).values()])
+    monkeypatch.setattr(Node, "declare_parameter", note)
+    declare(node, [each for name in NODES for each in parameters_of(name).values()])
     for value, descriptor in described:
         assert descriptor.read_only
         assert descriptor.description

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy._rclpy_pybind11 import RCLError
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.messages import AFTERLIFE, Outbox
-from afm_scan_ros.ros import RCLError
 
 
 class Moody:

@@ -4,14 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.nodes.topics import DONE, FAILED, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 
 NAMES = ("source", "middle", "end")
 
 
 def peers(*reports: Report) -> Peers:
     made = Peers()
-    made.follow(NAMES, "now", 100.0)
+    made.follow(NAMES, "watcher", "now", 100.0)
     for report in reports:
         made.hear(report)
     return made
@@ -44,12 +44,15 @@ def test_a_failure_is_told_with_its_reason_even_before_a_scan() -> None:
     assert peers(report("stranger", FAILED)).failure() is None
 
 
-def test_silence_counts_from_the_last_word_or_the_beginning() -> None:
+def test_silence_counts_from_the_last_word() -> None:
     heard = peers(report("middle", heard=103.0))
-    assert heard.silence(NAMES, 100.9, 1.0) is None
-    assert heard.silence(("middle",), 103.9, 1.0) is None
-    assert heard.silence(("middle",), 104.1, 1.0) == "middle has been silent for 1 s"
-    assert heard.silence(NAMES, 103.5, 1.0) == "source has been silent for 1 s"
+    assert heard.silence(NAMES, 103.9, 1.0) is None
+    assert heard.silence(NAMES, 104.1, 1.0) == "middle has been silent for 1 s"
+
+
+def test_a_node_that_was_never_heard_is_not_silent() -> None:
+    """It may still start."""
+    assert peers().silence(NAMES, 1e6, 1.0) is None
 
 
 @given(st.lists(st.floats(0.0, 200.0), max_size=3), st.floats(0.0, 200.0))
@@ -68,7 +71,7 @@ def test_those_who_lack_are_described() -> None:
 
 def test_silence_counts_from_when_one_listens() -> None:
     """A node that was busy for long has the others' heartbeats still unread."""
-    made = peers()
+    made = peers(*(report(name) for name in NAMES))
     made.listen_anew(105.0)
     assert made.silence(NAMES, 105.5, 1.0) is None
     assert made.silence(NAMES, 106.5, 1.0) is not None

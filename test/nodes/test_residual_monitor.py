@@ -1,79 +1,87 @@
 """The monitor as a process among others: quiet on the scanner of the model, not on another."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from attrs import evolve
+from rclpy.node import Node
 
-from afm_scan_ros import ros
-from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.cli.options import CONFIG
-from afm_scan_ros.cli.orders import ScanFiles
-from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
-from afm_scan_ros.cli.scan import run_scan
+from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
-from afm_scan_ros.core.model import INVERSES, ScannerModel
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
-from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE, RUNNING
+from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
+from helpers.ros import PATIENCE, joined, until
 
-PATIENCE = 60.0
 LINES = 6
+PACE = {"real_time": False}
+"""Parameters of every node of a scan that no clock paces."""
 NAME = "residual_monitor"
 
 
-class Listener(ros.Node):
+class Listener(Node):
     """Keeps each line's residual, and what the monitor says of itself."""
 
     def __init__(self) -> None:
         super().__init__("listener")
-        self.lines: list[ros.Message] = []
+        self.lines: list[Message] = []
         self.said: list[tuple[str, str]] = []
         topic = MODEL_RESIDUAL
         self.create_subscription(topic.kind, topic.name, self.lines.append, topic.reader)
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
-    def _hear(self, message: ros.Message) -> None:
+    def _hear(self, message: Message) -> None:
         if message.node == NAME:
             self.said.append((message.state, message.reason))
 
 
 @pytest.fixture
 def listener() -> Iterator[Listener]:
-    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    yield Listener()
-    ros.shutdown()
+    with joined():
+        made = Listener()
+        yield made
+        made.destroy_node()
 
 
-def scan(
-    spec: Path,
-    listener: Listener,
-    plant: Path,
-    model: Path = CONFIG / "model.yaml",
-    watchers: int = 1,
-) -> dict[str, NodeProcess]:
-    """Scan while the monitor looks on, without the generator waiting for it; return all nodes."""
-    source = {"required_nodes": ["inversion_compensator", "piezoscanner_sim"], "time_scale": 0.0}
-    sim = {"plant_file": str(plant), "min_subscriptions": watchers, "min_true_subscriptions": 0}
-    commands = [
-        NodeCommand(NAME, {"model_file": str(model), "min_subscriptions": 1}),
-        NodeCommand("piezoscanner_sim", sim),
-        NodeCommand("inversion_compensator", {"min_subscriptions": 1 + watchers}),
-        NodeCommand("trajectory_generator", source | {"min_subscriptions": 1}, spec),
-    ]
-    started = {command.name: NodeProcess.start(command) for command in commands}
-    executor = ros.SingleThreadedExecutor()
-    executor.add_node(listener)
-    deadline = time.monotonic() + PATIENCE
-    while any(n.process.poll() is None for n in started.values()) and time.monotonic() < deadline:
-        executor.spin_once(timeout_sec=0.05)
-    return started
+Scan = Callable[..., dict[str, NodeProcess]]
 
 
-def ended(nodes: dict[str, NodeProcess]) -> dict[str, int]:
-    return {name: node.process.wait(PATIENCE) for name, node in nodes.items()}
+@pytest.fixture
+def scan(spec: Path, listener: Listener, start: Callable[..., NodeProcess]) -> Scan:
+    """Return a function that scans while the monitor looks on; the source waits for others alone.
+
+    It returns all nodes when they have ended.
+    """
+
+    def run(plant: Path, model: Path = CONFIG / "model.yaml", watchers: int = 1) -> object:
+        required = ["inversion_compensator", "piezoscanner_sim"]
+        sim = {"plant_file": str(plant), "min_subscriptions": watchers}
+        nodes = [
+            start(NAME, model_file=str(model), min_subscriptions=1, **PACE),
+            start("piezoscanner_sim", **sim, min_true_subscriptions=0, **PACE),
+            start("inversion_compensator", min_subscriptions=1 + watchers, **PACE),
+            start(
+                "trajectory_generator",
+                spec,
+                required_nodes=required,
+                time_scale=0.0,
+                min_subscriptions=1,
+                **PACE,
+            ),
+        ]
+        until(lambda: all(node.process.poll() is not None for node in nodes), listener)
+        return {node.name: node for node in nodes}
+
+    return run
+
+
+def failed(nodes: dict[str, NodeProcess]) -> list[str]:
+    return [node.last_words() for node in nodes.values() if node.process.wait(PATIENCE)]
 
 
 def written(node: NodeProcess) -> str:
@@ -82,10 +90,10 @@ def written(node: NodeProcess) -> str:
 
 
 def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
-    spec: Path, listener: Listener
+    scan: Scan, listener: Listener
 ) -> None:
-    nodes = scan(spec, listener, CONFIG / "plant.yaml")
-    assert set(ended(nodes).values()) == {0}
+    nodes = scan(CONFIG / "plant.yaml")
+    assert failed(nodes) == []
     assert [message.line for message in listener.lines] == list(range(LINES))
     assert all(0.0 < m.rms_x < m.max_x < 1e-7 and m.rms_y < m.max_y for m in listener.lines)
     assert {reason for state, reason in listener.said if state in ("running", "done")} == {""}
@@ -94,9 +102,9 @@ def test_each_line_s_residual_is_published_and_a_healthy_scanner_is_no_news(
     assert "[WARN]" not in written(nodes[NAME])
 
 
-def test_a_scanner_that_changed_is_told_to_all_and_scans_on(spec: Path, listener: Listener) -> None:
-    nodes = scan(spec, listener, CONFIG / "plants/delay_large.yaml")
-    assert set(ended(nodes).values()) == {0}
+def test_a_scanner_that_changed_is_told_to_all_and_scans_on(scan: Scan, listener: Listener) -> None:
+    nodes = scan(CONFIG / "plants/delay_large.yaml")
+    assert failed(nodes) == []
     assert len(listener.lines) == LINES
     alarms = {reason for state, reason in listener.said if state in ("running", "done") and reason}
     assert len(alarms) == 1
@@ -131,24 +139,11 @@ def without_model_discrepancy(model: ScannerModel) -> ScannerModel:
 
 
 def test_a_model_of_unmodel_discrepancy_is_refused_and_the_scan_goes_on(
-    spec: Path, listener: Listener, tmp_path: Path
+    scan: Scan, tmp_path: Path
 ) -> None:
     model = tmp_path / "model.yaml"
     save_model(model, without_model_discrepancy(load_model(CONFIG / "model.yaml")), "A model.")
-    nodes = scan(spec, listener, CONFIG / "plant.yaml", model, watchers=0)
-    statuses = ended(nodes)
-    assert statuses.pop(NAME) == 2
-    assert set(statuses.values()) == {0}
-    assert "states no model_discrepancy" in nodes[NAME].last_words()
-
-
-def test_a_watched_scan_tells_its_alarm_and_records_each_line(
-    spec: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    plant, bag = CONFIG / "plants/delay_large.yaml", tmp_path / "bag"
-    run_scan(ScanFiles(spec, CONFIG / "model.yaml", plant, bag), INVERSES, watched=True)
-    said = [line for line in capfd.readouterr().err.splitlines() if line.startswith(f"{NAME}: ")]
-    assert len(said) == 1
-    assert said[0].endswith("Diagnose this scan's bag")
-    topics = [message.topic for message in messages(bag / "bag_0.mcap")]
-    assert topics.count("/model_residual") == LINES
+    nodes = scan(CONFIG / "plant.yaml", model, watchers=0)
+    (said,) = failed(nodes)
+    assert nodes[NAME].process.returncode == 2
+    assert "states no model_discrepancy" in said

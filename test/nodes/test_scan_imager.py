@@ -1,26 +1,28 @@
 """The imager as a process among others: its images grow, are latched, and show the sample."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rclpy.node import Node
 
-from afm_scan_ros import ros
-from afm_scan_ros.cli.processes import NodeCommand, NodeProcess
+from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.imaging.lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import RETRACE_IMAGE, TRACE_IMAGE
+from helpers.ros import PATIENCE, joined, until
 
-PATIENCE = 60.0
 PIXELS = 100
 CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_imager")
 SPEC = ScanSpec(range_x=10e-6, range_y=10e-6, line_rate=20.0, lines=6, samples_per_line=1000)
 
+Start = Callable[..., NodeProcess]
 
-class Viewer(ros.Node):
+
+class Viewer(Node):
     """Keeps every image that is shown."""
 
     def __init__(self) -> None:
@@ -33,7 +35,7 @@ class Viewer(ros.Node):
             )
 
 
-def pixels(message: ros.Message) -> NDArray[np.float32]:
+def pixels(message: Message) -> NDArray[np.float32]:
     assert (message.encoding, message.is_bigendian) == ("32FC1", 0)
     assert message.header.frame_id == "scanner"
     assert message.step == 4 * message.width
@@ -43,9 +45,10 @@ def pixels(message: ros.Message) -> NDArray[np.float32]:
 
 @pytest.fixture
 def viewer() -> Iterator[Viewer]:
-    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    yield Viewer()
-    ros.shutdown()
+    with joined():
+        made = Viewer()
+        yield made
+        made.destroy_node()
 
 
 @pytest.fixture
@@ -56,31 +59,22 @@ def sample(tmp_path: Path) -> Path:
     return tmp_path / "ramp.npy"
 
 
-def test_images_grow_line_by_line(spec: Path, sample: Path, viewer: Viewer) -> None:
-    source = {"required_nodes": list(CONSUMERS), "time_scale": 1.0, "min_subscriptions": 2}
-    imager = {
-        "sample_file": str(sample),
-        "sample_width_um": 20.0,
-        "pixels": PIXELS,
-        "image_rate_hz": 10.0,
-        "min_subscriptions": 1,
-    }
-    commands = [
-        NodeCommand("scan_imager", imager),
-        NodeCommand("piezoscanner_sim", {"min_true_subscriptions": 0}),
-        NodeCommand("inversion_compensator", {"min_subscriptions": 1}),
-        NodeCommand("trajectory_generator", source, spec),
+def test_images_grow_line_by_line(start: Start, spec: Path, sample: Path, viewer: Viewer) -> None:
+    nodes = [
+        start(
+            "scan_imager",
+            sample_file=str(sample),
+            sample_width_um=20.0,
+            pixels=PIXELS,
+            image_rate_hz=10.0,
+            min_subscriptions=1,
+        ),
+        start("piezoscanner_sim", min_true_subscriptions=0),
+        start("inversion_compensator", min_subscriptions=1),
+        start("trajectory_generator", spec, required_nodes=list(CONSUMERS)),
     ]
-    started = [NodeProcess.start(command) for command in commands]
-    executor = ros.SingleThreadedExecutor()
-    executor.add_node(viewer)
-    deadline = time.monotonic() + PATIENCE
-    while any(node.process.poll() is None for node in started) and time.monotonic() < deadline:
-        executor.spin_once(timeout_sec=0.05)
-    words = [node.last_words() for node in started if node.process.wait(PATIENCE)]
-    for node in started:
-        node.output.close()
-    assert words == []
+    until(lambda: all(node.process.poll() is not None for node in nodes), viewer)
+    assert [node.last_words() for node in nodes if node.process.returncode] == []
     for images in viewer.images.values():
         heights = [len(image) for image in images]
         assert heights == sorted(heights)
@@ -101,8 +95,9 @@ def test_images_grow_line_by_line(spec: Path, sample: Path, viewer: Viewer) -> N
         ({"pixels": 1}, "parameter pixels"),
     ],
 )
-def test_what_cannot_be_imaged_is_refused_at_once(parameters: dict[str, object], says: str) -> None:
-    node = NodeProcess.start(NodeCommand("scan_imager", parameters))
+def test_what_cannot_be_imaged_is_refused_at_once(
+    start: Start, parameters: dict[str, object], says: str
+) -> None:
+    node = start("scan_imager", **parameters)
     assert node.process.wait(PATIENCE) == 2
     assert says in node.last_words()
-    node.output.close()

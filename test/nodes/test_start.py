@@ -5,11 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from rclpy.node import Node
 
-from afm_scan_ros import ros
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import NODE_STATE
+from helpers.ros import PATIENCE, joined, until
 
-PATIENCE = 60.0
 SLOW_IMPORT = """
 import sys, time
 class Finder:
@@ -63,23 +64,16 @@ def test_a_signal_while_the_interpreter_ends_changes_no_status(number: signal.Si
 
 
 def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> None:
-    ros.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
-    try:
-        heard: list[ros.Message] = []
-        listener, executor = ros.Node("listener"), ros.SingleThreadedExecutor()
-        listener.create_subscription(
-            NODE_STATE.kind, NODE_STATE.name, heard.append, NODE_STATE.reader
-        )
-        executor.add_node(listener)
+    heard: list[Message] = []
+    with joined():
+        listener = Node("listener")
+        topic = NODE_STATE
+        listener.create_subscription(topic.kind, topic.name, heard.append, topic.reader)
         code = "from afm_scan_ros.nodes import start; raise SystemExit(start('scan_imager'))"
         with run(code, "--ros-args", "-p", "sample_file:=nowhere.npy") as node:
-            while node.poll() is None:
-                executor.spin_once(timeout_sec=0.05)
+            until(lambda: node.poll() is not None, listener)
             _, said = node.communicate()
-        executor.shutdown()
         listener.destroy_node()
-    finally:
-        ros.shutdown()
     logged, last = said.splitlines()[-2:]
     assert logged.startswith("[ERROR] [")
     assert "[scan_imager]: failed: nowhere.npy" in logged

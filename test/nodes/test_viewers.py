@@ -6,9 +6,9 @@ from pathlib import Path
 from unittest.mock import patch
 
 import setuptools
+from rclpy.qos import ReliabilityPolicy
 
 from afm_scan_ros.nodes.topics import MONITOR
-from afm_scan_ros.ros import ReliabilityPolicy
 from helpers.viewers import LAYOUTS
 
 ROOT = Path(__file__).parents[2]

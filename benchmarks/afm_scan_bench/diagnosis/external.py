@@ -21,7 +21,7 @@ from afm_scan_bench.diagnosis.closed_loop import SPEC
 from afm_scan_bench.faults.injection.hosts import (
     ADDRESSES,
     NetworkLink,
-    cyclone_uri,
+    host_environment,
     on_host,
     two_hosts,
 )
@@ -75,12 +75,7 @@ def measure() -> Table:
 
 def _joined(host: str) -> tuple[Mapping[str, str], str]:
     """Return the environment of a process on a host, and the host."""
-    joined = {
-        "CYCLONEDDS_URI": cyclone_uri(host),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-        "ROS_DOMAIN_ID": "0",
-    }
-    return joined, host
+    return host_environment(host), host
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from afm_scan_bench.faults.viewers import load
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.topics import BLOCKS, RUNNING, TRUE
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import BLOCKS, TRUE
 from afm_scan_ros.report.table import Row, Table
 
 SECONDS = 60.0

@@ -12,7 +12,8 @@ from afm_scan_bench.faults.injection.trial import PATIENT, Trial
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.topics import BLOCKS, RUNNING
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import BLOCKS
 from afm_scan_ros.report.table import Row, Table
 
 MINUTES = 30.0

@@ -1,4 +1,4 @@
-"""How fast a scan goes through its processes, beside what moving its blocks alone takes."""
+"""How fast a scan goes through its nodes, and how fast plain nodes pass on its blocks."""
 
 import subprocess
 import sys
@@ -32,18 +32,18 @@ COLUMNS = {
     "real_time": ("of real time", ".1f"),
     "slowest": ("slowest", ".1f"),
     "fastest": ("fastest", ".1f"),
-    "plain_per_s": ("binding alone, blocks/s", ".0f"),
+    "plain_per_s": ("plain rclpy nodes, blocks/s", ".0f"),
     "share": ("share of it", ".2f"),
     "lowest": ("lowest", ".2f"),
     "highest": ("highest", ".2f"),
 }
 
 PARTS = ("recorder", "scanner", "compensator", "source")
-START = "from afm_scan_bench.speed.unmodified import main; main({!r}, {}, {})"
+START = "from afm_scan_bench.speed.plain_rclpy import main; main({!r}, {}, {})"
 
 
 def measure() -> Table:
-    """Run the nodes and the binding alone by turns, for each size of block."""
+    """Run the nodes and plain nodes by turns, for each size of block."""
     return table(SIZES, TURNS)
 
 
@@ -51,7 +51,7 @@ def table(sizes: Mapping[int, int], turns: int) -> Table:
     """Return the table of so many blocks of each size."""
     title = (
         f"Generator, compensator, simulated scanner and recorder as processes; real time is"
-        f" {RATE:,d} samples/s in x and y (targets with 1000: 5 times, and 0.6 of the binding)"
+        f" {RATE:,d} samples/s in x and y (targets: 8 times with 2000, 20 times with 10000)"
     )
     rows = [_row(size, blocks, turns) for size, blocks in sizes.items()]
     curve = TableCurve("block", "real_time", logarithmic=True)
@@ -85,7 +85,7 @@ def nodes_rate(size: int, blocks: int) -> float:
 
 
 def plain_rate(size: int, blocks: int) -> float:
-    """Blocks a second of the binding alone through the same hops.
+    """Blocks a second of plain nodes through the same hops.
 
     Raises ScanError, and ends the others, where a part of it ended badly.
     """
@@ -112,7 +112,7 @@ def _await(running: Sequence["subprocess.Popen[str]"]) -> None:
             for process in running:
                 process.kill()
                 process.communicate()
-            raise ScanError(f"the binding alone: {dict(zip(PARTS, statuses, strict=True))}")
+            raise ScanError(f"plain nodes: {dict(zip(PARTS, statuses, strict=True))}")
 
 
 def _commands(bag: Path, size: int, blocks: int) -> list[NodeCommand]:

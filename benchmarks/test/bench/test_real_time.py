@@ -12,6 +12,7 @@ from afm_scan_bench.faults.injection import clocked_scanner, trial
 from afm_scan_bench.faults.injection.clocked_scanner import ClockedScanner
 from afm_scan_bench.faults.injection.drive import DriveOutcome
 from afm_scan_bench.faults.injection.processes import NODES
+from afm_scan_bench.faults.injection.trial import Heard
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import load_settings
@@ -93,9 +94,23 @@ def test_a_viewer_costs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     patient = {name: {**trial.FLOW.get(name, {}), **trial.PATIENT[name]} for name in NODES}
     monkeypatch.setattr(trial, "FLOW", patient)  # a writer that blocks does so for longer
     monkeypatch.setattr(viewers, "DURATION", 2.0)
+    monkeypatch.setattr(viewers, "LATE", trial.PATIENCE)  # the machine may be busy
     monkeypatch.setattr(viewers, "SIGNALS", {kind: viewers.SIGNALS[kind]})
     (row,) = viewers.disturb(tmp_path / "scans", 20_000, 1, lambda _: None)
     assert (row["trials"], row["whole"], row["trouble"]) == (1, 1, "")
+
+
+def test_lateness_is_that_of_the_latest_node_until_it_is_done() -> None:
+    heard = [
+        Heard(9.0, "scan_recorder", "ready", 0, ""),
+        Heard(10.0, NODES[0], "running", 0, ""),
+        Heard(11.0, NODES[0], "running", 100, ""),
+        Heard(11.5, "scan_recorder", "running", 80, ""),
+        Heard(13.0, NODES[0], "done", 200, ""),
+        Heard(99.0, NODES[0], "done", 200, ""),
+    ]
+    assert viewers.lateness(heard, 0.01) == pytest.approx(1.0)
+    assert viewers.lateness(heard[:1], 0.01) == 0.0
 
 
 def test_a_row_counts_what_was_in_time_and_named() -> None:

@@ -14,7 +14,9 @@ class Undisturbed:
     """The streams of a scan that nothing disturbed, for others to be held against."""
 
     def __init__(self, bag: Path) -> None:
-        self._streams = _streams(read_scan(bag))
+        recording = read_scan(bag)
+        self.sample_period = recording.info.sample_period
+        self._streams = _streams(recording)
         self.total_samples = min(len(trace.x) for trace in self._streams.values())
 
     def kept(self, bag: Path) -> int:

@@ -4,18 +4,24 @@ A calibration record of hysteresis is made in real time, by a source as it is an
 with a fault in it.
 """
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import rclpy
 from attrs import define, field
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.injection.faulty_scanner import (
     FAULT_AT,
+    RECORDER,
     SCANNER,
     SILENT,
     SOURCE,
@@ -23,26 +29,41 @@ from afm_scan_bench.faults.injection.faulty_scanner import (
     note,
 )
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
-from afm_scan_bench.faults.injection.trial import PATIENCE, Trial
-from afm_scan_ros.core.types import Array
-from afm_scan_ros.nodes.topics import ACHIEVED, FAILED
-from afm_scan_ros.ros import Node, SignalHandlerOptions, SingleThreadedExecutor, init
-from afm_scan_ros.ros.cyclone import HOLDS_LOCK
+from afm_scan_bench.faults.injection.trial import MOMENT, PATIENCE, Trial
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.peers import FAILED
+from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE
 
 RECORD: Mapping[str, object] = {
     "kind": "hysteresis",
-    "required_nodes": [SCANNER],
-    "min_subscriptions": 1,
+    "scan_id": "this",
+    "required_nodes": [SCANNER, RECORDER],
+    "min_subscriptions": 2,
     "block_size": 500,
     "window": 5000,
 }
+RECORDED: Mapping[str, object] = {"topics": [DRIVE.name, ACHIEVED.name]}
+READERS = 2
+"""Readers of the drive: the scanner and the recorder."""
+PERIOD = 5e-5
+"""Sample period (s) of the record."""
+LONGEST_RECORD = 10.0
+"""Seconds in which a record that runs reaches the fault, on a busy machine."""
 LONGEST = 200
 """Bytes of two rows of the record, and more."""
-SMALL_CACHE = (
-    "<CycloneDDS><Domain><Internal><Watermarks><WhcHigh>64kB</WhcHigh><WhcHighInit>64kB"
-    "</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks></Internal></Domain></CycloneDDS>"
-)
-"""Settings with which a stopped reader blocks the writer after four blocks."""
+BLOCKING = """<?xml version="1.0"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <data_writer profile_name="writer" is_default_profile="true">
+    <topic><resourceLimitsQos><max_samples>8</max_samples><max_instances>1</max_instances>
+      <max_samples_per_instance>8</max_samples_per_instance></resourceLimitsQos></topic>
+    <qos><reliability><kind>RELIABLE</kind>
+      <max_blocking_time><sec>120</sec></max_blocking_time></reliability></qos>
+  </data_writer>
+</profiles>
+"""
+"""Settings of Fast DDS with which a stopped reader blocks the writer after eight messages."""
 
 
 @define
@@ -70,14 +91,14 @@ class OutputLog:
 
     def has_reached(self, sample: int) -> bool:
         """Return whether the drive before a sample has been output."""
-        last = self._last()
+        last = self.last()
         return last.size > 0 and last[1] >= sample
 
     def is_at_rest(self) -> bool:
         """Return whether the record ends with outputs at 0 V, after the fault."""
-        return self.has_reached(FAULT_AT + 1) and not np.any(self._last()[2:])
+        return self.has_reached(FAULT_AT + 1) and not np.any(self.last()[2:])
 
-    def _last(self) -> Array:
+    def last(self) -> Array:
         """Return the last row that is whole, read often: empty before there is one."""
         if not self.path.exists():
             return np.empty(0)
@@ -109,26 +130,19 @@ class FaultyProcesses:
     def start(cls, folder: Path, fault: Fault) -> "FaultyProcesses":
         """Start them; what the node writes lies beside the log."""
         log = folder / "outputs.txt"
-        run = (
-            f"import sys; from {Fault.__module__} import faulty_node;"
-            " sys.exit(faulty_node(*sys.argv[1:3]))"
-        )
         given = {
             "output_log": log,
-            "min_subscriptions": int(fault.viewer),
+            "min_subscriptions": 1 + fault.viewer,
             "min_true_subscriptions": 0,
         }
-        arguments = [word for pair in given.items() for word in ("-p", f"{pair[0]}:={pair[1]}")]
-        blocks = {"CYCLONEDDS_URI": SMALL_CACHE, HOLDS_LOCK: "1"} if fault.viewer else {}
-        with (folder / "node.txt").open("wb") as output:
-            node = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-c", run, fault.name, str(log), "--ros-args", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                start_new_session=True,
-                env={**os.environ, **blocks},
-            )
+        blocks = {}
+        if fault.viewer:
+            (profile := folder / "blocking.xml").write_text(BLOCKING, "utf-8")
+            blocks = {
+                "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
+                "RMW_FASTRTPS_USE_QOS_FROM_XML": "1",
+            }
+        node = _started("faulty_node", fault, log, given, blocks)
         watch = f"from {__name__} import watch; watch()"
         viewer = subprocess.Popen([sys.executable, "-c", watch]) if fault.viewer else None  # noqa: S603
         return cls(fault, OutputLog(log), node, viewer)
@@ -137,11 +151,14 @@ class FaultyProcesses:
         """Do what is done from outside."""
         if self.viewer is not None:
             self.viewer.send_signal(signal.SIGSTOP)
+        if self.fault.forged:
+            note(self.log.path)
+            _forge(self.log)
         if not self.fault.number:
             return
         note(self.log.path)
-        if self.fault.to == "source":
-            trial.nodes[SOURCE].send(self.fault.number)
+        if self.fault.to in trial.nodes:
+            trial.nodes[self.fault.to].send(self.fault.number)
             return
         send = os.killpg if self.fault.to == "group" else os.kill
         send(self.driver if self.fault.to == "driver" else self.node.pid, self.fault.number)
@@ -163,31 +180,77 @@ class FaultyProcesses:
                 process.wait()
 
 
+def _started(
+    run: str,
+    fault: Fault,
+    log: Path,
+    parameters: Mapping[str, object],
+    environment: Mapping[str, str],
+) -> "subprocess.Popen[bytes]":
+    """Start a node with a fault; what it writes lies beside the log."""
+    code = f"import sys; from {Fault.__module__} import {run}; sys.exit({run}(*sys.argv[1:3]))"
+    pairs = [f"{name}:={json.dumps(value, default=str)}" for name, value in parameters.items()]
+    arguments = [word for pair in pairs for word in ("-p", pair)]
+    with (log.parent / f"{run}.txt").open("wb") as output:
+        return subprocess.Popen(  # noqa: S603 - our own interpreter and module
+            [sys.executable, "-c", code, fault.name, str(log), "--ros-args", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+            env={**os.environ, **environment},
+        )
+
+
+def _forge(log: "OutputLog") -> None:
+    """Publish drive of the scan, from where its outputs are."""
+    node = Node("forger")
+    publisher = node.create_publisher(DRIVE.kind, DRIVE.name, DRIVE.writer)
+    deadline = time.monotonic() + PATIENCE
+    while publisher.get_subscription_count() < READERS and time.monotonic() < deadline:
+        time.sleep(MOMENT)
+    info = ScanInfo("this", 10**18, "hysteresis", PERIOD, 10**6)
+    first = int(log.last()[1])
+    for start in range(first, first + 5000, 500):
+        block = Trace(start, PERIOD, np.full(500, -4.9), np.full(500, -4.9))
+        publisher.publish(block_message(DRIVE.kind, info, block, last=False))
+
+
 def watch() -> None:
     """Read the displacement reliably, as somebody's viewer does."""
-    init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node("viewer")
     node.create_subscription(ACHIEVED.kind, ACHIEVED.name, lambda _: None, ACHIEVED.reader)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    while True:
-        executor.spin_once(timeout_sec=1.0)
+    rclpy.spin(node)
 
 
 def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     """Inject a fault into one scan, and see when the outputs were at rest."""
     folder.parent.mkdir(exist_ok=True)
     done = DriveOutcome()
-    with Trial(folder, **{SOURCE: RECORD}) as trial:
-        trial.start(SOURCE)
+    with Trial(folder, **{SOURCE: RECORD, RECORDER: RECORDED}) as trial:
+        neighbours = _start_neighbours(trial, folder, fault)
         scanner = FaultyProcesses.start(folder, fault)
         try:
             _follow(trial, scanner, done)
         finally:
             scanner.kill()
+            for neighbour in neighbours:
+                neighbour.kill()
+                neighbour.wait()
         if not trial.until(scanner.has_ended, PATIENCE):
             done.broken.append("the driver's process outlived its node")
     return done
+
+
+def _start_neighbours(trial: Trial, folder: Path, fault: Fault) -> "list[subprocess.Popen[bytes]]":
+    """Start source and recorder; return the one that has a fault of its own."""
+    faulty = fault.to if fault.method and fault.to in (SOURCE, RECORDER) else ""
+    trial.start(*(name for name in (SOURCE, RECORDER) if name != faulty))
+    if not faulty:
+        return []
+    given = {**RECORD} if faulty == SOURCE else {**RECORDED, "bag": trial.bag}
+    return [_started("faulty_neighbour", fault, folder / "outputs.txt", given, {})]
 
 
 def _follow(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
@@ -195,7 +258,10 @@ def _follow(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
         done.broken.append("the scan did not begin")
         return
     scanner.find_driver()
-    trial.until(lambda: scanner.log.has_reached(FAULT_AT))
+    if not trial.until(lambda: scanner.log.has_reached(FAULT_AT), LONGEST_RECORD):
+        failed = {each.reason for each in trial.heard if each.state == FAILED}
+        done.broken.append(f"the scan ended before the fault: {failed}")
+        return
     scanner.inject(trial)
     if not trial.until(scanner.log.is_at_rest):
         done.broken.append("the outputs stayed up")
@@ -210,8 +276,8 @@ def _judge_words(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> 
         trial.until(lambda: scanner.node.poll() is not None)
         if scanner.node.returncode not in (1, INCOMPLETE):
             done.broken.append(f"the scanner's node ended with {scanner.node.returncode}")
-    if scanner.fault.to != "source":
-        trial.until_ended()
+    if scanner.fault.to != SOURCE:
+        trial.until(lambda: trial.statuses()[SOURCE] is not None)
         if trial.statuses()[SOURCE] != INCOMPLETE:
             done.broken.append(f"the source ended with {trial.statuses()[SOURCE]}")
     failed = [each.reason for each in trial.heard if each.state == FAILED]

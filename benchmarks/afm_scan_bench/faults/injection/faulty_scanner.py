@@ -16,12 +16,17 @@ from afm_scan_ros.drivers import AxisSettings, DriverChoice, Reading, ScannerSet
 from afm_scan_ros.drivers.link import Link
 from afm_scan_ros.drivers.simulated import SimulatedScanner
 from afm_scan_ros.nodes import piezoscanner_sim
+from afm_scan_ros.nodes.excitation_generator import ExcitationGenerator
 from afm_scan_ros.nodes.run import run_node
+from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.nodes.scan_recorder import ScanRecorder
 
 FAULT_AT = 20_000
 """Sample from which there is a fault: after a second, with 4 V on both axes."""
 HANG = 120
 """Seconds."""
+LATE = 0.8
+"""Seconds after which an answer comes that is due after 0.3."""
 SENSOR = AxisSettings(1.0, 0.0, -100e-6, 100e-6)
 """The simulated sensor reads metres; these are the ends of its converter's range."""
 RESPONSE, RESOLUTION = 0.02, 0.05
@@ -37,6 +42,11 @@ def _hang() -> None:
     ctypes.PyDLL(None).sleep(HANG)
 
 
+def _sleep() -> None:
+    """Sleep, while other threads work."""
+    time.sleep(HANG)
+
+
 def note(log: object) -> None:
     """Write down the moment of a fault, beside the log of the outputs."""
     path = Path(f"{log}.fault")
@@ -48,9 +58,9 @@ def note(log: object) -> None:
 class Fault:
     """A fault; ``message`` is in the scan's nodes' reports of it.
 
-    From FAULT_AT on, ``method`` of the scanner's node does ``act`` in place of its work, or the
-    driver ``driver`` of this module fails; or the bench sends ``number`` to ``to``, or blocks
-    publish by a ``viewer`` that it stops.
+    From FAULT_AT on, ``method`` of the scanner's node, or of ``to``, does ``act`` in place of its
+    work, or the driver ``driver`` of this module fails; or the bench sends ``number`` to ``to``,
+    or blocks publish by a ``viewer`` that it stops, or publishes ``forged`` drive.
     """
 
     name: str
@@ -61,20 +71,43 @@ class Fault:
     number: int = 0
     to: str = "node"
     viewer: bool = False
+    forged: bool = False
 
 
 _BUG = "ZeroDivisionError: injected"
-SOURCE, SCANNER = "excitation_generator", "piezoscanner_sim"
+SOURCE, SCANNER, RECORDER = "excitation_generator", "piezoscanner_sim", "scan_recorder"
 SILENT = f"{SCANNER} has been silent"
 _SOURCE_SILENT = f"{SOURCE} has been silent"
+_RECORDER_SILENT = f"{RECORDER} has been silent"
+_LATE = "the driver has not answered"
 _LOST = "the sensor is lost"
 FAULTS = (
     Fault("scanner's node killed (SIGKILL)", SILENT, number=signal.SIGKILL),
-    Fault("source's node killed (SIGKILL)", _SOURCE_SILENT, number=signal.SIGKILL, to="source"),
+    Fault("source's node killed (SIGKILL)", _SOURCE_SILENT, number=signal.SIGKILL, to=SOURCE),
+    Fault("recorder killed (SIGKILL)", _RECORDER_SILENT, number=signal.SIGKILL, to=RECORDER),
+    Fault("recorder stopped (SIGSTOP)", _RECORDER_SILENT, number=signal.SIGSTOP, to=RECORDER),
+    Fault(
+        "recorder hangs, its heartbeat goes on",
+        f"{RECORDER} has finished no sample",
+        "receive_raw",
+        _sleep,
+        to=RECORDER,
+    ),
+    Fault(
+        "source hangs, its heartbeat goes on",
+        f"{SOURCE} has finished no sample",
+        "step",
+        _sleep,
+        to=SOURCE,
+    ),
+    Fault("driver answers half a second late", _LATE, driver="LateScanner"),
+    Fault("driver hangs, another thread can ramp", _LATE, driver="HungScanner"),
+    Fault("forged drive of this scan", "another publisher", forged=True),
     Fault("scanner's node stopped (SIGSTOP)", SILENT, number=signal.SIGSTOP),
-    Fault("source's node stopped (SIGSTOP)", _SOURCE_SILENT, number=signal.SIGSTOP, to="source"),
+    Fault("source's node stopped (SIGSTOP)", _SOURCE_SILENT, number=signal.SIGSTOP, to=SOURCE),
     Fault("publish blocks, the interpreter locked", SILENT, viewer=True),
     Fault("a callback hangs, the interpreter locked", SILENT, "consume", _hang),
+    Fault("a callback hangs, its heartbeat goes on", SCANNER, "consume", _sleep),
     Fault("sensor lost (constant reading)", _LOST, driver="LostSensor"),
     Fault("sensor reads NaN", _LOST, driver="NanSensor"),
     Fault("sensor clipped", "which is clipped", driver="ClippedSensor"),
@@ -175,6 +208,26 @@ class RaisingScanner(FaultyScanner):
         return super().advance(drive)
 
 
+class LateScanner(FaultyScanner):
+    """Its converter stalls once for longer than it may."""
+
+    def fail(self, drive: Trace) -> Reading:
+        """Answer half a second after the answer is due."""
+        time.sleep(LATE)
+        return super().advance(drive)
+
+
+class HungScanner(FaultyScanner):
+    """Its call never returns, and its outputs can be ramped meanwhile."""
+
+    RAMPS_WHILE_BLOCKED = True
+
+    def fail(self, drive: Trace) -> Reading:
+        """Wait for ever."""
+        _sleep()
+        return super().advance(drive)
+
+
 class RaisingWatchdog(FaultyScanner):
     """The watchdog's wait in its process raises."""
 
@@ -187,10 +240,18 @@ class RaisingWatchdog(FaultyScanner):
 def faulty_node(name: str, log: str) -> int:
     """Run the scanner's node with a fault in it; return its status."""
     fault = BY_NAME[name]
-    if fault.method:
-        _break(fault.method, fault.act, log)
+    if fault.method and fault.to == "node":
+        _break(piezoscanner_sim.PiezoscannerSim, fault.method, fault.act, log)
     watch_the_sensor(f"{__name__}:{fault.driver}" if fault.driver else "")
     return run_node(piezoscanner_sim.PiezoscannerSim.NAME)
+
+
+def faulty_neighbour(name: str, log: str) -> int:
+    """Run the source or the recorder with a fault in it; return its status."""
+    fault = BY_NAME[name]
+    kind: type[ScanNode] = ScanRecorder if fault.to == RECORDER else ExcitationGenerator
+    _break(kind, fault.method, fault.act, log)
+    return run_node(kind.NAME)
 
 
 def watch_the_sensor(driver: str = "") -> None:
@@ -212,11 +273,10 @@ def watch_the_sensor(driver: str = "") -> None:
     setattr(kind, "choice", choice)  # noqa: B010 - no method, to the type checker
 
 
-def _break(method: str, act: Callable[[], None], log: str) -> None:
-    kind = piezoscanner_sim.PiezoscannerSim
+def _break(kind: type[ScanNode], method: str, act: Callable[[], None], log: str) -> None:
     whole = getattr(kind, method)
 
-    def broken(node: piezoscanner_sim.PiezoscannerSim, *given: object, **named: object) -> object:
+    def broken(node: ScanNode, *given: object, **named: object) -> object:
         if node.next_sample < FAULT_AT:
             return whole(node, *given, **named)
         note(log)

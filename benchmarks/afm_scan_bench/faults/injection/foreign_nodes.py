@@ -8,6 +8,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from attrs import define, evolve, field
+from rclpy.node import Node
+from sensor_msgs.msg import Image
 
 from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
@@ -16,10 +18,9 @@ from afm_scan_bench.faults.injection.trial import PATIENT, SCAN, Trial, numbered
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import block_message
+from afm_scan_ros.nodes.messages import Message, block_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 from afm_scan_ros.report.table import Row
-from afm_scan_ros.ros import Image, Message, Node
 
 TRIALS = 15
 """Of each of the four."""

@@ -10,10 +10,12 @@ import multiprocessing
 import os
 import select
 import struct
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,8 +29,24 @@ if TYPE_CHECKING:
 ADDRESSES = {f"afm_a_{os.getpid()}": "10.77.0.1", f"afm_b_{os.getpid()}": "10.77.0.2"}
 """Of the hosts, by names of namespaces and devices: none that another run, once killed, left."""
 _TUNSETIFF, _IFF_TUN, _IFF_NO_PI = 0x400454CA, 0x0001, 0x1000  # linux/if_tun.h
-_HELLO = "<SPDPInterval>1 s</SPDPInterval>"  # after a lost one, the next comes 30 s later
 _LONGEST_PACKET = 65536
+PROFILE = """<?xml version="1.0"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <transport_descriptors>
+    <transport_descriptor><transport_id>network</transport_id><type>UDPv4</type></transport_descriptor>
+  </transport_descriptors>
+  <participant profile_name="network" is_default_profile="true"><rtps>
+    <userTransports><transport_id>network</transport_id></userTransports>
+    <useBuiltinTransports>false</useBuiltinTransports>
+    <builtin><discovery_config><leaseAnnouncement><sec>1</sec></leaseAnnouncement>
+    </discovery_config></builtin>
+  </rtps></participant>
+  <data_writer profile_name="writer" is_default_profile="true">
+    <times><heartbeatPeriod><sec>0</sec><nanosec>20000000</nanosec></heartbeatPeriod></times>
+  </data_writer>
+</profiles>
+"""
+"""Of Fast DDS: no shared memory; after a lost announcement, the next comes a second later."""
 _FORKING = multiprocessing.get_context("fork")
 _ip = partial(system, "/sbin/ip")
 
@@ -86,22 +104,18 @@ def on_host(name: str, arguments: list[str]) -> list[str]:
     return ["ip", "netns", "exec", name, *arguments]
 
 
-def cyclone_uri(name: str) -> str:
-    """Return what lets Cyclone DDS on a host find the nodes of both, without multicast."""
-    peers = "".join(f'<Peer address="{address}"/>' for address in ADDRESSES.values())
-    return (
-        f'<General><Interfaces><NetworkInterface address="{ADDRESSES[name]}" multicast="false"/>'
-        "</Interfaces><AllowMulticast>false</AllowMulticast></General><Discovery>"
-        f"<ParticipantIndex>auto</ParticipantIndex>{_HELLO}<Peers>{peers}</Peers></Discovery>"
-    )
-
-
 def host_environment(name: str) -> dict[str, str]:
-    """Return the variables of a process on a host, whose nodes find those of both."""
+    """Return the variables of a process on a host, whose nodes find those of both.
+
+    Both hosts share this machine's memory, through which no packet would pass that can be lost.
+    """
+    profile = Path(tempfile.gettempdir()) / "afm_scan_two_hosts.xml"
+    profile.write_text(PROFILE, "utf-8")
     return {
         **os.environ,
-        "CYCLONEDDS_URI": cyclone_uri(name),
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+        "ROS_STATIC_PEERS": ";".join({*ADDRESSES.values()} - {ADDRESSES[name]}),
         "ROS_DOMAIN_ID": "0",
     }
 

@@ -16,7 +16,7 @@ from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import BLOCK, Trial, numbered, undisturbed
 from afm_scan_ros.bag.writer import CHUNK_BYTES
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.nodes.topics import FAILED
+from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.report.table import Row
 
 TRIALS = 50

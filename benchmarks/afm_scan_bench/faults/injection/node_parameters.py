@@ -6,11 +6,14 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+
 from afm_scan_bench.faults.injection.outcome import LossError
 from afm_scan_bench.faults.injection.readings import refuse_other, written
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.ros import SignalHandlerOptions, init, try_shutdown, undeclared_parameters
 
 UNKNOWN_PARAMETER = "started, with a warning of what it does not know"
 ANSWERED = "answered as they read"
@@ -26,7 +29,7 @@ def read_parameters(path: Path) -> str:
         ((section, body),) = written(path).items()
         if section != f"/**/{name}":
             return IGNORED
-        unknown = set(undeclared_parameters(node)) - {"bag"}
+        unknown = set(undeclared(node)) - {"bag"}
         known = {k: v for k, v in body["ros__parameters"].items() if k not in unknown}
         values = {each: node.get_parameter(each).value for each in known}
         refuse_other(known, values)
@@ -38,7 +41,7 @@ def read_parameters(path: Path) -> str:
 @contextmanager
 def _joined(name: str, arguments: list[str], path: Path) -> Iterator[ScanNode]:
     try:
-        init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = _kind(name)()
         try:
             yield node
@@ -47,7 +50,7 @@ def _joined(name: str, arguments: list[str], path: Path) -> Iterator[ScanNode]:
     except InputError as error:  # of one parameter, whose file rclpy cannot name either
         raise InputError(f"{path}: {error}") from error
     finally:
-        try_shutdown()
+        rclpy.try_shutdown()
 
 
 def _kind(name: str) -> type[ScanNode]:

@@ -27,8 +27,8 @@ INCOMPLETE = 3
 
 NO_LIMIT = resource.RLIM_INFINITY
 
-_FORKING = multiprocessing.get_context("forkserver")
-_FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{name}" for name in NODES])
+FORKING = multiprocessing.get_context("forkserver")
+FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{name}" for name in NODES])
 
 
 @frozen(eq=False)
@@ -61,7 +61,7 @@ class Forked:
             *(argument for pair in pairs for argument in ("-p", pair)),
         ]
         given = dict(os.environ), arguments, output, room
-        process = _FORKING.Process(target=_live, args=given, daemon=True)
+        process = FORKING.Process(target=_live, args=given, daemon=True)
         process.start()
         return cls(name or kind, process, output)
 

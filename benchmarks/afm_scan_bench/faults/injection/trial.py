@@ -6,22 +6,22 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import rclpy
 from attrs import frozen
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.faults import Announce
+from afm_scan_bench.faults.injection import viewer
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NO_LIMIT, NODES, Forked
 from afm_scan_ros.cli.processes import isolate
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.topics import NODE_STATE, RUNNING
-from afm_scan_ros.ros import (
-    Message,
-    Node,
-    SignalHandlerOptions,
-    SingleThreadedExecutor,
-    init,
-    shutdown,
-)
+from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.topics import NODE_STATE
 
 PATIENCE = 60.0
 """Longest wait, s, for what a trial waits for: a hang, if it takes longer."""
@@ -93,7 +93,8 @@ class Trial:
     def __enter__(self) -> Self:
         self.folder.mkdir()
         isolate()
-        init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        middleware.prepare()
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._listener = Listener()
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._listener)
@@ -109,7 +110,7 @@ class Trial:
             node.process.kill()
             node.process.join()
         self._executor.shutdown()
-        shutdown()
+        rclpy.shutdown()
 
     @property
     def heard(self) -> list[Heard]:
@@ -130,6 +131,11 @@ class Trial:
         bag = {"bag": str(self.folder / name)} if kind == "scan_recorder" else {}
         output = self.folder / f"{len(self._started)}_{name}.txt"
         self._started.append(Forked.start(kind, bag, output, name=name))
+        return self._started[-1]
+
+    def start_viewer(self) -> Forked:
+        """Start a viewer, which has no part in the scan."""
+        self._started.append(viewer.start(self.folder / "viewer.txt"))
         return self._started[-1]
 
     def listen(self, seconds: float) -> None:

@@ -1,0 +1,77 @@
+"""Commands that scan by nodes, each a process: a scan whole, and refused before it moves."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli import options
+from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.scan import run_scan
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.nodes.topics import BLOCKS
+from helpers.viewers import assert_curves_are_recorded, assert_samples_are_of_the_streams
+
+
+def files(spec: Path, bag: Path) -> ScanFiles:
+    return ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
+
+
+def test_a_scan_is_recorded_whole_and_follows_what_was_desired(
+    spec: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(options, "EVERY", 0.0)  # so that every step is told
+    run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
+    told = capsys.readouterr().err
+    assert f"scan to {tmp_path / 'bag'}: " in told
+    assert re.search(r": \d+%, sample \d+ of \d+ \(\d+ s\)\n", told)
+    recording = read_scan(tmp_path / "bag")
+    info = recording.info
+    assert info.inverses == ("creep", "hysteresis", "vibration")
+    streams = {name: recording.whole(name) for name in BLOCKS}
+    assert {len(trace.x) for trace in streams.values()} == {info.total_samples}
+    assert info.spec is not None
+    lines = slice(phases(info.spec).lines.start, phases(info.spec).lines.stop)
+    desired, achieved = streams["desired_displacement"], streams["achieved_displacement"]
+    error = (achieved.x - desired.x)[lines]
+    assert np.sqrt(np.mean(error**2)) < 0.01 * info.spec.range_x
+    assert recording.warnings == ()
+    assert_curves_are_recorded(tmp_path / "bag")
+    assert_samples_are_of_the_streams(tmp_path / "bag", step=100)  # 200 a second of 20 kHz
+
+
+def test_a_bag_is_never_overwritten(spec: Path, tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(InputError, match="bag exists already"):
+        run_scan(files(spec, tmp_path / "bag"), ("none",))
+
+
+def test_a_scan_beyond_the_identified_range_is_refused_before_it_moves(
+    spec: Path, tmp_path: Path
+) -> None:
+    text = spec.read_text("utf-8").replace("range_x_um: 10.0", "range_x_um: 90.0")
+    spec.write_text(text, "utf-8")
+    largest = r"the largest range of this scan: x \d\d\.\d µm, y 10 µm"
+    with pytest.raises(ScanError, match=rf"inversion_compensator: sample \d+, axis x.*; {largest}"):
+        run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
+    assert list(tmp_path.iterdir()) == [spec]  # so that a mended scan can have the bag's name
+
+
+def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_path: Path) -> None:
+    """The compensator alone knows of 5 V, the plant of less."""
+    text = (CONFIG / "plant.yaml").read_text("utf-8")
+    text = text.replace("\n  voltage_limit_v: 5.0", "\n  voltage_limit_v: 2.6")
+    (plant := tmp_path / "plant.yaml").write_text(text, "utf-8")
+    wide = "range_x_um: 45.0\n    preparation: none"
+    spec.write_text(spec.read_text("utf-8").replace("range_x_um: 10.0", wide), "utf-8")
+    given = ScanFiles(spec, CONFIG / "model.yaml", plant, tmp_path / "bag")
+    with pytest.raises(ScanError, match=r"compensator: sample .* amplifier's 2\.6: .*x \d"):
+        run_scan(given, ("creep", "hysteresis", "vibration"))
+    assert sorted(tmp_path.iterdir()) == [plant, spec]

@@ -1,0 +1,122 @@
+"""Where samples stand still, every node of the scan names the one at which they do."""
+
+from collections.abc import Iterator
+
+from attrs import define, field, frozen
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING, Peers, Report
+
+READS = {  # in the order of the data flow
+    "source": (),
+    "compensator": ("source",),
+    "scanner": ("compensator",),
+    "monitor": ("source", "scanner"),
+    "recorder": ("source", "compensator", "scanner"),
+}
+NODES = tuple(READS)
+BLOCK, WINDOW, TOTAL = 200, 4000, 12_000
+INFO = ScanInfo("now", 10**18, "creep", 1e-4, TOTAL, window=WINDOW, nodes=NODES)
+TICK, LIMIT, PAUSE = 0.02, 0.3, 0.12
+"""Seconds between two states of a node, that samples may stand still, that a node may seem to."""
+HOLDS_BACK = WINDOW // 2 - 3 * BLOCK
+"""Most samples of a preview and a latency together: nodes refuse a window of less than twice."""
+
+
+@frozen
+class Faults:
+    """Who stops after which sample, if anybody; what two nodes hold back, and all nodes' speeds."""
+
+    victim: str
+    stops_at: int
+    held: dict[str, int]
+    speed: dict[str, int]
+
+
+@st.composite
+def faults(draw: st.DrawFn, *victims: str) -> Faults:
+    preview = draw(st.integers(0, HOLDS_BACK))
+    latency = draw(st.integers(0, HOLDS_BACK - preview))
+    return Faults(
+        draw(st.sampled_from(victims)),
+        draw(st.integers(1, TOTAL // BLOCK - 1)) * BLOCK,
+        {"compensator": preview, "scanner": latency},
+        {name: BLOCK * draw(st.integers(1, 4)) for name in NODES},
+    )
+
+
+@define
+class Chain:
+    """Nodes that take what there is, as fast as they can; the source keeps to the window."""
+
+    faults: Faults
+    reach: dict[str, int] = field(factory=lambda: dict.fromkeys(NODES, 0))
+
+    def move(self) -> None:
+        for name in NODES:
+            free = min((self._output(each) for each in READS[name]), default=TOTAL)
+            if name == "source":
+                free = min(TOTAL, min(self.reach.values()) + WINDOW)
+            if name == self.faults.victim:
+                free = min(free, self.faults.stops_at)
+            self.reach[name] = max(self.reach[name], min(free, self._after(name)))
+
+    def _after(self, name: str) -> int:
+        return self.reach[name] + self.faults.speed[name]
+
+    def _output(self, name: str) -> int:
+        """Return up to which sample others can read: whole blocks, and all after the last one."""
+        if (reach := self.reach[name]) == TOTAL:
+            return TOTAL
+        return max(0, reach - self.faults.held.get(name, 0)) // BLOCK * BLOCK
+
+    @property
+    def done(self) -> bool:
+        return set(self.reach.values()) == {TOTAL}
+
+
+def state(name: str, reach: int) -> str:
+    if name == "source":
+        return RUNNING
+    return {0: READY, TOTAL: DONE}.get(reach, RUNNING)
+
+
+def verdicts(chain: Chain, watcher: str) -> Iterator[str | None]:
+    """Yield what a node says, at each moment of a scan and while it stands still."""
+    peers, now, advanced = Peers(), 100.0, 100.0
+    peers.follow(NODES, watcher, INFO.scan_id, now)
+    peers.begin(now)
+    while not chain.done and now < 103.0:
+        before = chain.reach[watcher]
+        chain.move()
+        now += TICK
+        advanced = advanced if chain.reach[watcher] == before else now
+        reports = {
+            name: Report(
+                name,
+                INFO.scan_id,
+                state(name, reach),
+                reach,
+                "",
+                now,
+                advanced,
+            )
+            for name, reach in chain.reach.items()
+        }
+        for report in reports.values():
+            peers.hear(report)
+        yield peers.standstill(reports[watcher], INFO, now, LIMIT, PAUSE)
+
+
+@given(faults(*NODES), st.sampled_from(NODES))
+def test_whoever_watches_names_the_node_that_stopped(given_: Faults, watcher: str) -> None:
+    said = {each for each in verdicts(Chain(given_), watcher) if each}
+    where = f"it stands at sample {given_.stops_at}"
+    assert said == {f"{given_.victim} has finished no sample for {LIMIT:g} s: {where}"}
+
+
+@given(faults(""), st.sampled_from(NODES))
+def test_while_samples_advance_nobody_is_named(given_: Faults, watcher: str) -> None:
+    assert not any(verdicts(Chain(given_), watcher))
