@@ -14,7 +14,6 @@ from typing import Any
 
 import attrs
 import click
-from names_of_ros import names_of_ros
 
 import afm_scan_ros
 from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
@@ -24,6 +23,7 @@ from afm_scan_ros.files.records import key_of
 from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
+from names_of_ros import names_of_ros
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
