@@ -21,10 +21,9 @@ from afm_scan_ros.drivers import ScannerSettings
 from afm_scan_ros.files import model_file, plant_file, share_directory
 from afm_scan_ros.files.records import key_of
 from afm_scan_ros.nodes import NODES as NODE_NAMES
-from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
-from afm_scan_ros.nodes.scan_node import COMMON
+from names_of_ros import names_of_ros
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
@@ -34,7 +33,7 @@ API = (
     " shape `(n,)` or `(n, channels)`. An example:"
 )
 NODES = (
-    "With ROS 2 a node runs by `ros2 run afm_scan_ros NAME`. Without ROS the same arguments follow"
+    "A node needs ROS 2, and runs by `ros2 run afm_scan_ros NAME` or, with the same arguments, by"
     " `afm-scan run NAME`. All parameters are fixed when a node starts."
 )
 FILES = (
@@ -160,23 +159,20 @@ def _command(name: str, command: click.Command, above: click.Context) -> Iterato
 
 def nodes() -> str:
     """Return the parameters of every node and the arguments of the launch file."""
-    parts = [
-        "# Nodes and their parameters",
-        NODES,
-        "## Parameters of every node",
-        _parameters(COMMON),
-    ]
-    for name in NODE_NAMES:
-        node = next(
-            value
-            for value in vars(importlib.import_module(f"afm_scan_ros.nodes.{name}")).values()
-            if getattr(value, "NAME", None) == name
-        )
-        own = [*node.PARAMETERS]
-        if name == "trajectory_generator":
-            own += scan_spec_parameters()
-        parts += [f"## {name}", _paragraphs(node.__doc__), _parameters(own)]
-    return "\n\n".join((*parts, *_launch())) + "\n"
+    with names_of_ros():
+        common = importlib.import_module("afm_scan_ros.nodes.scan_node").COMMON
+        sections = [_node(name) for name in NODE_NAMES]
+    parts = ["# Nodes and their parameters", NODES, "## Parameters of every node"]
+    return "\n\n".join((*parts, _parameters(common), *sections, *_launch())) + "\n"
+
+
+def _node(name: str) -> str:
+    found = vars(importlib.import_module(f"afm_scan_ros.nodes.{name}")).values()
+    node = next(value for value in found if getattr(value, "NAME", None) == name)
+    own = [*node.PARAMETERS]
+    if name == "trajectory_generator":
+        own += scan_spec_parameters()
+    return f"## {name}\n\n{_paragraphs(node.__doc__)}\n\n{_parameters(own)}"
 
 
 def _launch() -> Iterator[str]:
@@ -196,16 +192,21 @@ def _launch() -> Iterator[str]:
 
 def messages() -> str:
     """Return the fields of every message, and the topics."""
-    rows = []
-    for topic in vars(topics).values():
-        if isinstance(topic, topics.NodeTopic):
-            promised = (topic.writer.reliability, topic.writer.durability, topic.writer.history)
-            quality = ", ".join(each.name.lower().replace("_", " ") for each in promised)
-            rows.append((f"`{topic.name}`", topic.kind.__name__, quality))
-    parts = ["# Messages and topics", "## Topics", _table(("topic", "type", "delivery"), rows)]
+    parts = ["# Messages and topics", "## Topics"]
+    parts.append(_table(("topic", "type", "delivery"), _topics()))
     for path in sorted((ROOT / "msg").glob("*.msg")):
         parts += _message(path)
     return "\n\n".join(parts) + "\n"
+
+
+def _topics() -> Iterator[tuple[str, ...]]:
+    with names_of_ros():
+        topics = importlib.import_module("afm_scan_ros.nodes.topics")
+        for topic in vars(topics).values():
+            if isinstance(topic, topics.NodeTopic):
+                promised = (topic.writer.reliability, topic.writer.durability, topic.writer.history)
+                quality = ", ".join(each.name.lower().replace("_", " ") for each in promised)
+                yield f"`{topic.name}`", topic.kind.__name__, quality
 
 
 def _message(path: Path) -> Iterator[str]:

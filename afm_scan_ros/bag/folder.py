@@ -9,6 +9,7 @@ import yaml
 from attrs import define, frozen
 
 from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
+from afm_scan_ros.bag.mcap_sizes import refuse_sizes
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.yaml import load
 
@@ -143,6 +144,7 @@ def bag_files(path: Path) -> BagFiles:
     for file in files:
         if not is_mcap(file):
             raise InputError(f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap'")
+        refuse_sizes(file)
     return BagFiles(files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f)))
 
 

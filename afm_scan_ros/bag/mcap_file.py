@@ -1,7 +1,4 @@
-"""Messages of MCAP files in the order of recording, also of a file that was cut short.
-
-The summary at the end of a whole file is read without reading all of it.
-"""
+"""Messages of MCAP files in the order of recording, also of a file that was cut short."""
 
 import struct
 import zlib
@@ -17,23 +14,22 @@ from attrs import define, frozen
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, DataEnd, Schema, Statistics
 from mcap.stream_reader import CRCValidationError, read_magic
-from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from afm_scan_ros.bag.mcap_sizes import HEAD
 from afm_scan_ros.core.errors import InputError
 
-LARGEST = 2**28
+LARGEST = 2**27
 """Bytes that a chunk may unpack to; recorders write a few MB."""
 
-HEAD = struct.Struct("<BQ")
-"""Of a record: what it is, and its length."""
 _MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
-_TOGETHER = 64
-"""Messages looked at together, at most: where lengths vary, the look ahead is in vain."""
+_MOST_OTHERS = 2**17
+"""Records of a chunk that are no messages: schemas and channels have numbers of 16 bits each."""
+_TOGETHER, _MOST_TOGETHER = 64, 2**16
+"""Messages looked at together, at first and at most: where lengths vary, it is in vain."""
 
 
 @frozen(eq=False)
@@ -49,27 +45,34 @@ def records(data: bytes) -> Iterator[Schema | Channel | RepeatedLayout]:
 
     Raises EOFError or struct.error where one ends beyond the chunk.
     """
-    place = 0
+    place = others = 0
+    together = _TOGETHER
     while place < len(data):
         kind, size = HEAD.unpack_from(data, place)
         end = place + HEAD.size + size
         if end > len(data):
             raise EOFError(f"a record of {size} bytes in a chunk that ends before")
         if kind == Opcode.MESSAGE:
-            yield (messages := _alike(data, place, end - place))
-            end = place + len(messages.channels) * (end - place)
-        elif kind == Opcode.SCHEMA:
+            yield (messages := _alike(data, place, end - place, together))
+            alike = len(messages.channels)
+            together = min(_MOST_TOGETHER, 4 * together) if alike == together else _TOGETHER
+            place += alike * (end - place)
+            continue
+        others += 1
+        if others > _MOST_OTHERS:
+            raise ValueError(f"a chunk of over {_MOST_OTHERS} records that are no messages")
+        if kind == Opcode.SCHEMA:
             yield Schema.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
         elif kind == Opcode.CHANNEL:
             yield Channel.read(ReadDataStream(BytesIO(data[place + HEAD.size : end])))
         place = end
 
 
-def _alike(data: bytes, place: int, stride: int) -> RepeatedLayout:
+def _alike(data: bytes, place: int, stride: int, most: int) -> RepeatedLayout:
     """Return the message at a place, with those behind it that are as long."""
     if stride < HEAD.size + _MESSAGE.size:
         raise EOFError(f"a message of {stride - HEAD.size} bytes, which ends before its times")
-    count = min((len(data) - place) // stride, _TOGETHER)
+    count = min((len(data) - place) // stride, most)
     rows = np.ndarray((count, stride), np.uint8, data, place)
     same = (rows[:, : HEAD.size] == rows[0, : HEAD.size]).all(axis=1)
     rows = rows[: count if same.all() else same.argmin()]
@@ -118,10 +121,11 @@ def _decompressed(chunk: Chunk, most: int) -> bytes:
 
 _DATA_END = struct.Struct("<BQI")  # kind, length, checksum of all records before it
 _FOOTER = struct.Struct("<BQQQI")  # kind, length, where the summary begins, its index, its checksum
-_CHECKSUM_SIZE = 4
+_ENCODING_SIZE = 4  # of a message in CDR: what names the encoding
+_PIECE = 2**20  # bytes of what is passed over, read at once
 
 # What comes of taking the last bytes of a file that was cut for a footer.
-_UNREADABLE = (struct.error, ValueError, OSError)
+UNREADABLE = (struct.error, ValueError, OSError)
 
 # What a reader runs into where a file was cut: any record may end anywhere.
 CUT = (McapError, struct.error, EOFError, ValueError)
@@ -233,7 +237,8 @@ def _records(
         yield from _record(source, kind, size, before)
         if source.count > end:
             raise EOFError(f"a record that ends behind the {size} bytes that it states")
-        source.read(end - source.count)
+        while source.count < end:
+            source.read(min(end - source.count, _PIECE))
     read_magic(source)
 
 
@@ -264,6 +269,8 @@ def _of_topics(
         if number not in channels:
             raise McapError(f"a message of channel {number}, which is not declared")
         channel, cdrs = channels[number], _rows(messages.cdrs, messages.channels == number)
+        if channel.message_encoding == "cdr" and cdrs.shape[1] < _ENCODING_SIZE:
+            raise McapError(f"a message of {channel.topic} without its encoding")
         yield RawMessages(channel.topic, schemas.get(channel.schema_id, ""), cdrs)
 
 
@@ -276,36 +283,19 @@ def _rows(cdrs: NDArray[np.uint8], wanted: NDArray[np.bool_]) -> NDArray[np.uint
     return cdrs[in_turns] if even else cdrs[places]
 
 
-def summary(path: Path) -> Summary | None:
-    """Read the summary of a file; None where there is none, or none with a checksum that holds."""
-    with path.open("rb") as stream:
-        try:
-            start, checksum = _footer(stream)
-            size = stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - _CHECKSUM_SIZE - start
-            if not start or size > LARGEST:
-                return None
-            stream.seek(start)
-            if zlib.crc32(stream.read(size)) != checksum:
-                return None
-            stream.seek(0)
-            return SeekingReader(stream).get_summary()
-        except (McapError, *_UNREADABLE):
-            return None
-
-
 def data_is_checked(path: Path) -> bool:
     """Return whether a file may have a checksum of its records; those of chunks are beside it."""
     with path.open("rb") as stream:
         try:
-            start, _ = _footer(stream)
+            start, _ = footer(stream)
             stream.seek((start or _place_of_footer(stream)) - _DATA_END.size)
             *_, checksum = _DATA_END.unpack(stream.read(_DATA_END.size))
-        except _UNREADABLE:
+        except UNREADABLE:
             return True
         return bool(checksum)
 
 
-def _footer(stream: BinaryIO) -> tuple[int, int]:
+def footer(stream: BinaryIO) -> tuple[int, int]:
     """Return where the summary begins, 0 if there is none, and its checksum."""
     place = stream.seek(_place_of_footer(stream))
     _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
@@ -316,57 +306,3 @@ def _footer(stream: BinaryIO) -> tuple[int, int]:
 
 def _place_of_footer(stream: BinaryIO) -> int:
     return stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - _FOOTER.size
-
-
-def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
-    """Yield each message of the type ``wanted``, and an empty one of each other topic.
-
-    A file whose summary does not hold is read as a whole, with all its messages. Raises InputError
-    where that is damaged.
-    """
-    found = summary(path)
-    try:
-        listed = None if found is None else list(_listed(path, found, wanted))
-    except CUT:
-        listed = None
-    yield from messages(path) if listed is None else listed
-
-
-def _listed(path: Path, found: Summary, wanted: str) -> Iterator[RawMessage]:
-    if found.statistics is None or not all(i.message_index_offsets for i in found.chunk_indexes):
-        raise McapError("no index of messages")
-    schemas = {number: schema.name for number, schema in found.schemas.items()}
-    counts = found.statistics.channel_message_counts
-    for number, channel in found.channels.items():
-        if not counts.get(number):
-            continue
-        type_name = schemas.get(channel.schema_id, "")
-        if type_name == wanted:
-            texts = list(_of_channel(path, found, number))
-            if len(texts) != counts[number]:
-                raise McapError("the index lacks messages")
-            yield from (RawMessage(channel.topic, type_name, cdr) for cdr in texts)
-        else:
-            yield RawMessage(channel.topic, type_name, b"")
-
-
-def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
-    with path.open("rb") as stream:
-        for index in found.chunk_indexes:
-            if number in index.message_index_offsets:
-                for record in records(unpacked(_chunk(stream, index.chunk_start_offset))):
-                    if isinstance(record, RepeatedLayout):
-                        yield from map(bytes, record.cdrs[record.channels == number])
-
-
-def _chunk(stream: BinaryIO, place: int) -> Chunk:
-    size = stream.seek(0, SEEK_END)
-    if place > size:
-        raise McapError("an index of what lies behind the end")
-    bounded = Bounded(stream, size, stream.seek(place))
-    source = ReadDataStream(cast("BinaryIO", bounded))
-    kind, _ = HEAD.unpack(source.read(HEAD.size))
-    if kind != Opcode.CHUNK:
-        raise McapError("no chunk where the index states")
-    chunk: Chunk = Chunk.read(source)
-    return chunk

@@ -8,7 +8,8 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.bag.folder import bag_files
-from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, outline, runs
+from afm_scan_ros.bag.mcap_file import RawMessage, RawMessages, runs
+from afm_scan_ros.bag.mcap_summary import outline
 from afm_scan_ros.bag.scan_info import (
     DISPLACEMENT,
     STREAMS,
@@ -27,6 +28,9 @@ from afm_scan_ros.core.types import AXES, Trace
 
 TYPES = {**STREAMS, "scan_info": SCAN_INFO}
 """What a bag may hold of a scan, with the types."""
+
+MOST_INFOS, LONGEST_INFO = 100, 2**16
+"""Different messages of a topic that tells of one scan, and the bytes of one."""
 
 _BY_TYPE = {VOLTAGE: "drive_voltage", DISPLACEMENT: "achieved_displacement", SCAN_INFO: "scan_info"}
 """What a topic of another name holds where it is the only one of its type."""
@@ -188,14 +192,22 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
     either, naming what is missing and what is there. Damage further in shows where it is read.
     """
     found = bag_files(path)
-    seen = [message for file in found.files for message in outline(file, SCAN_INFO)]
-    there = {message.topic: message.type_name for message in seen}
+    there: dict[str, str] = {}
+    infos: dict[str, dict[bytes, None]] = {}
+    for message in (message for file in found.files for message in outline(file, SCAN_INFO)):
+        there[message.topic] = message.type_name
+        if message.type_name == SCAN_INFO:
+            different = infos.setdefault(message.topic, {})
+            different[_short(message, path)] = None
+            if len(different) > MOST_INFOS:
+                raise InputError(
+                    f"{path}: {message.topic} announces over {MOST_INFOS} scans: record one scan a"
+                    " bag"
+                )
     topics = assigned(there, chosen, path)
-    announced = topics.pop("scan_info", None)
     info: ScanInfo | None = None
-    for message in seen:
-        if message.topic == announced:
-            info = _info(message, info, path)
+    for cdr in infos.get(topics.pop("scan_info", ""), ()):
+        info = _info(cdr, info, path)
     if info is None and topics:
         first = _first_info(path, found.files, topics)
         warnings = (*found.warnings, _without_info(path))
@@ -212,10 +224,20 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
     return ScanRecording(path, info, topics, found.warnings, found.files)
 
 
-def _info(message: RawMessage, before: ScanInfo | None, path: Path) -> ScanInfo:
+def _short(message: RawMessage, path: Path) -> bytes:
+    """Return the CDR of a scan_info; raises InputError where it is too long for one."""
+    if len(message.cdr) > LONGEST_INFO:
+        raise InputError(
+            f"{path}: {message.topic} has {len(message.cdr)} bytes, over {LONGEST_INFO}: it is no"
+            " scan_info"
+        )
+    return message.cdr
+
+
+def _info(cdr: bytes, before: ScanInfo | None, path: Path) -> ScanInfo:
     """Read the latched message, which may have been recorded more than once; not two scans."""
     try:
-        info = decode_info(message.cdr)
+        info = decode_info(cdr)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     if before is not None and before.scan_id != info.scan_id:

@@ -23,7 +23,7 @@ PACKAGE = "afm_scan_ros/msg"
 FRAME = "scanner"
 
 Message: TypeAlias = Any
-"""Of a class that is made at run time from a definition, by rosbags, rosidl or the stand-in."""
+"""Of a class that is made at run time from a definition, by rosbags or rosidl."""
 
 
 @cache

@@ -14,14 +14,20 @@ from afm_scan_ros.cli.orders import (
     RecordOrder,
     ScanOrder,
     file_of,
+    settings_of,
 )
 from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
 from afm_scan_ros.cli.watch import watching
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.trajectory import TO_AND_FRO
+from afm_scan_ros.core.trajectory import TO_AND_FRO, total_samples
 from afm_scan_ros.files.drive_files import save_drive
+from afm_scan_ros.nodes.parameters import INVERSION, inversion_settings
 
+CORRECTED = 2.0
+"""Steps of the drive that corrections may add, learned or fed back: as much as the scan itself."""
 PIXELS = 256
 """In a line of the images shown."""
 
@@ -99,10 +105,29 @@ def _scan_commands(order: ScanOrder) -> list[NodeCommand]:
         NodeCommand("scan_recorder", recorded, file_of("scan_recorder")),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
-        *_scanner_commands(scanner, readers),
+        *_scanner_commands(scanner, {**readers, "step_limit_v": _step_limit(order)}),
         NodeCommand(COMPENSATOR, model | drive_readers, file_of(COMPENSATOR)),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
+
+
+def _step_limit(order: ScanOrder) -> float:
+    """Return the largest step of the drive (V) that a scan needs, with room for its corrections.
+
+    0 for none, where the scan is too long to be inverted before it begins or cannot be driven: the
+    compensator says why.
+    """
+    own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    given = inversion_settings({**own, "inverses": order.inverses})
+    given = evolve(given, line_feedback=False, adapt=False)
+    samples = total_samples(order.spec)
+    if samples > own["preflight_samples"]:
+        return 0.0
+    try:
+        inversion = ScanInversion(order.model, order.spec, given)
+        return CORRECTED * inversion.largest_step(samples)
+    except ScanError:
+        return 0.0
 
 
 def _imager(spec: ScanSpec, *, images: bool) -> list[NodeCommand]:

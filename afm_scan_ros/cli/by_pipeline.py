@@ -1,6 +1,6 @@
 """A scan or a record in this process, where there is no ROS."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from afm_scan_ros.cli.orders import (
     Parameters,
     RecordOrder,
     ScanOrder,
-    parameters_of,
+    settings_of,
 )
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
@@ -33,7 +33,6 @@ from afm_scan_ros.nodes.parameters import (
     ALARMS,
     INVERSION,
     SIMULATION,
-    NodeParameter,
     checked,
     inversion_settings,
     simulated_scanner,
@@ -45,7 +44,7 @@ def scan(order: ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
     files, spec = order.files, order.spec
     flow = _flow({**order.flow, **order.scanner.source}, str(files.spec))
-    own = _settings(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
     given = inversion_settings({**own, "inverses": order.inverses})
     info = evolve(
         info_of_scan(spec, *identity(flow["scan_id"])),
@@ -100,23 +99,17 @@ def _flowing(info: ScanInfo, flow: Mapping[str, Any]) -> dict[str, Any]:
     return {"info": info, "block_size": size}
 
 
-def _settings(part: str, parameters: Iterable[NodeParameter], own: Parameters) -> dict[str, Any]:
-    """Return a part's parameters: its own before those of its file, and these before defaults."""
-    given = {**parameters_of(part), **own}
-    return {each.name: given.get(each.name, each.default) for each in parameters}
-
-
 def _driver(scanner: ScannerChoice, own: Parameters) -> DriverChoice:
     given = {**scanner.parameters, **own}
     if scanner.node == SIM_NODE:
-        return simulated_scanner(_settings(SIM_NODE, SIMULATION, given), SIM_NODE)
+        return simulated_scanner(settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
     return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
 
 
 def _monitor(order: ScanOrder) -> ScanMonitor | None:
     if not order.watched:
         return None
-    given = _settings(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
+    given = settings_of(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
     adaptation = None
     if given["adapt"]:
         adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])

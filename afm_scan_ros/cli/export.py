@@ -25,6 +25,7 @@ from afm_scan_ros.files.images.formats import WRITTEN, write_image
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.html import UNSTATED, source_of
+from afm_scan_ros.report.terminal import say
 
 TEXT, NETCDF = ".csv", ".nc"
 SIGNALS = {
@@ -153,10 +154,10 @@ def _say(
 ) -> None:
     if len(files) > 1:
         for file, channel in zip(files, channels, strict=True):
-            click.echo(f"{file} holds {channel.title}.")
+            say(f"{file} holds {channel.title}.")
     elif channels:
         lines, pixels = channels[0].values.shape
         names = ", ".join(dict.fromkeys(channel.name for channel in channels))
-        click.echo(f"{files[0]} holds {names}: {lines} lines of {pixels} pixels.")
+        say(f"{files[0]} holds {names}: {lines} lines of {pixels} pixels.")
     if signals:
-        click.echo(f"{files[0]} holds {len(signals[0].values)} samples of each signal.")
+        say(f"{files[0]} holds {len(signals[0].values)} samples of each signal.")

@@ -16,6 +16,7 @@ from afm_scan_ros.report.corrected_image import correction_figure
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.grating import grating_table, left_out, not_separated
 from afm_scan_ros.report.scan_figures import save
+from afm_scan_ros.report.terminal import say
 
 PER_MICROMETRE = 1e6
 SUFFIX = ".gwy"
@@ -96,21 +97,21 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     for name, status in effects.each():
         drive = "µm commanded" if scale is None else "V"
         known = filter(None, (status_text(status, drive), intervals_text(status)))
-        click.echo(f"x: {name} is {': '.join(known)}.")
+        say(f"x: {name} is {': '.join(known)}.")
     for sentence in (*left_out(used, found.positions), *not_separated(used, effects)):
-        click.echo(sentence)
+        say(sentence)
     for reason in found.refused:
-        click.echo(f"Not used: {reason}.")
+        say(f"Not used: {reason}.")
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
     held = f"x with what is identified above, and y as a gain{coupled}"
-    click.echo(f"{out} holds the model: {held}.")
+    say(f"{out} holds the model: {held}.")
     if folder is not None:
         table.save(folder)
         for image, better in zip(used, found.corrected, strict=True):
             _write_corrected(targets[given.index(image)], image, better)
         for target, image in zip(targets[len(given) :], others, strict=True):
             _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
-        click.echo(f"{folder} holds the corrected images, their pictures and the table.")
+        say(f"{folder} holds the corrected images, their pictures and the table.")
 
 
 def _timed(path: Path, line_time: float | None) -> ScanImage:
@@ -140,7 +141,7 @@ def _write_corrected(target: Path, image: ScanImage, corrected: ScanImage | None
     """Write a corrected image, if there is one, and a picture of it beside the recorded one."""
     name = Path(image.name).name
     if corrected is None:
-        click.echo(f"{name} is not corrected: the scanner turned back within a line.")
+        say(f"{name} is not corrected: the scanner turned back within a line.")
         return
     write_image(target, image_channels(corrected), words_of(corrected))
     save(correction_figure(name, image, corrected), target.with_suffix(".png"))

@@ -30,6 +30,7 @@ from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
+from afm_scan_ros.report.terminal import say
 
 TABLES = TableOptions()
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
@@ -124,20 +125,20 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
     write_text(out.with_suffix(".fit.html"), fit_page(found))
     _show(found)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
-    click.echo(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
+    say(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
 
 
 def _write_coupled(model: Model, out: Path) -> None:
     """Show the errors of a model of coupled axes on held-out records, and write it."""
     found = model.coupled
-    click.echo(f"{', '.join(found.axes)}: coupled vibration, {found.linear.order} states")
+    say(f"{', '.join(found.axes)}: coupled vibration, {found.linear.order} states")
     for error in found.errors:
-        click.echo(
+        say(
             f"   driven by {error.drive_rms:.3g} V rms, held-out record:"
             f" {1e9 * error.error_rms:.1f} nm rms, {error.relative:.2%} of the displacement's"
         )
     model.save(out, HEADING)
-    click.echo(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
+    say(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
 
 
 def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:
@@ -163,9 +164,9 @@ def _show(found: Identification) -> None:
 
 def _show_joint(axis: str, found: JointAxis) -> None:
     for effect, status in found.model.effects.each():
-        click.echo(f"{axis}: {effect}: {status_text(status)}")
+        say(f"{axis}: {effect}: {status_text(status)}")
     if found.joint is not None:
-        click.echo(
+        say(
             f"   displacement, fitted {1e9 * found.joint.fitted:.1f} nm rms, held out"
             f" {1e9 * found.joint.held_out:.1f} nm rms"
         )
@@ -175,24 +176,24 @@ def _show_joint(axis: str, found: JointAxis) -> None:
 def _show_axis(axis: str, found: AxisIdentification) -> None:
     report = found.report
     creep, fit = report.creep, report.vibration
-    click.echo(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
-    click.echo(
+    say(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
+    say(
         f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
         f" model minus response {fit.misfit:.2%} rms"
     )
     if report.operator is not None:
-        click.echo(f"   hysteresis, {operator_text(report.operator)}")
+        say(f"   hysteresis, {operator_text(report.operator)}")
     for name, error in (("exact", report.exact), ("direct", report.direct)):
         if error is not None:
             inverse = inverse_text(name, found.model.hysteresis)
             text = _text(error, 1e3, "mV")
-            click.echo(f"   hysteresis, held-out loops, {inverse}: {text}")
+            say(f"   hysteresis, held-out loops, {inverse}: {text}")
     _warn(map(finding_text, report.warnings))
 
 
 def _warn(sentences: Iterable[str]) -> None:
     for sentence in sentences:
-        click.echo(f"   warning: {sentence}", err=True)
+        say(f"   warning: {sentence}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:

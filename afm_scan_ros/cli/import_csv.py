@@ -27,8 +27,9 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import USE_OF_PATH, TableRecord, read_table_record
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.text_table import RowRange
+from afm_scan_ros.report.terminal import say
 
 STREAM = {
     "drive": "drive_voltage",
@@ -94,9 +95,9 @@ def import_csv(
         sampling_instant=sampling_instant,
     )
     write_record(bag, info, streams)
-    click.echo(f"{bag} holds {found.samples} samples of a record '{name}'.")
+    say(f"{bag} holds {found.samples} samples of a record '{name}'.")
     for axis in (axis for axis in AXES if axis not in axes):
-        click.echo(f"Axis {axis} was not measured: it is filled with zeros.")
+        say(f"Axis {axis} was not measured: it is filled with zeros.")
 
 
 def _axes(path: Path, record: TableRecord) -> tuple[str, ...]:
@@ -165,11 +166,11 @@ def invert(
     drive = scanner.invert(values, found.sample_period, limits=limits)
     _write(out, scanner.axes, found.sample_period, drive)
     extent = f"{drive.min():.4g} to {drive.max():.4g} V"
-    click.echo(f"{out} holds {len(drive)} samples of the drive, {extent}.")
+    say(f"{out} holds {len(drive)} samples of the drive, {extent}.")
 
 
 def _write(out: Path, axes: tuple[str, ...], period: float, drive: np.ndarray) -> None:
     heading = ",".join(["time_s", *(f"drive_{axis}_v" for axis in axes)])
     table = np.column_stack([period * np.arange(len(drive)), drive])
-    with writing(out):
-        np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")
+    with replacing(out) as beside:
+        np.savetxt(beside, table, fmt="%.9g", delimiter=",", header=heading, comments="")

@@ -35,6 +35,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import load_plant, load_scan, save_scan
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.close_loop import close_loop_page, final_text, reported, round_result
@@ -50,6 +51,7 @@ from afm_scan_ros.report.learning import (
     taught_text,
 )
 from afm_scan_ros.report.table import show
+from afm_scan_ros.report.terminal import say
 
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement")
 TRUE = "true_displacement"
@@ -183,7 +185,7 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     try:
         for each in rounds_of(session, base, validation_specs(diagnosed), rounds, _diagnose):
             done.append(each)
-            click.echo(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
+            say(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
             write_diagnosis(
@@ -229,13 +231,13 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     made = {"provenance": plain(of)}
     save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
-    (out / "report.html").write_text(close_loop_page(done, of, failure), "utf-8")
+    write_text(out / "report.html", close_loop_page(done, of, failure))
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
     show(final_text(done, failure))
     show(f"next: {step}" for step in next_steps(reported(done).diagnosis))
-    click.echo(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
+    say(f"Report: {out / 'report.html'}. JSON, models and bags are in the same folder.")
 
 
 def _shortcoming(done: Round) -> str:
@@ -298,7 +300,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         for each in learning_scans(session, base, wanted, scans, limits):
             done.append(each)
             errors = ", ".join(f"{axis} {1e9 * each.errors[axis]:.1f} nm" for axis in AXES)
-            click.echo(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
+            say(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
     except (InputError, ScanError, KeyboardInterrupt) as error:
         if not done:
             raise
@@ -312,7 +314,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         taught = _taught(base, done, out, made)
         _write(out, done, taught, made, failure)
         show(taught_text(taught))
-    click.echo(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
+    say(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
     if isinstance(ended, KeyboardInterrupt):
         raise ended
     if failure:
@@ -335,4 +337,4 @@ def _write(
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
-    (out / "report.html").write_text(learning_page(done, taught, of, failure), "utf-8")
+    write_text(out / "report.html", learning_page(done, taught, of, failure))

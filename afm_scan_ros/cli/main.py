@@ -1,6 +1,7 @@
 """The command ``afm-scan``: finds the subcommand, and ends with one line and a status."""
 
 import sys
+import warnings
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import NoReturn
@@ -9,6 +10,7 @@ import click
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.files import version
+from afm_scan_ros.report.terminal import complain, showing_log
 
 COMMANDS = {
     "demo": "Scan a simulated scanner without and with compensation, with a report.",
@@ -119,14 +121,20 @@ def cli(ctx: click.Context) -> None:
 
 
 def _end(message: object, status: int) -> NoReturn:
-    click.echo(f"afm-scan: {' '.join(str(message).split())}", err=True)
+    complain("afm-scan", message)
     sys.exit(status)
 
 
 def main() -> NoReturn:
-    """Run the command; whatever goes wrong is one line on stderr and an exit status."""
+    """Run the command; whatever goes wrong is one line on stderr and an exit status.
+
+    Python's warnings are for programmers, and shown where ``-W`` asks for them.
+    """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
     try:
-        sys.exit(cli.main(prog_name="afm-scan", standalone_mode=False))
+        with showing_log():
+            sys.exit(cli.main(prog_name="afm-scan", standalone_mode=False))
     except InputError as error:
         _end(error, BAD_INPUT)
     except ScanError as error:
@@ -138,6 +146,8 @@ def main() -> NoReturn:
         _end(f"{error.format_message().removesuffix('.')}. See '{command} --help'.", BAD_INPUT)
     except click.ClickException as error:
         _end(error.format_message(), BAD_INPUT)
+    except MemoryError as error:
+        _end(f"this takes more memory than there is ({error}): give less at once", BAD_INPUT)
     except OSError as error:
         if error.filename is None:
             raise

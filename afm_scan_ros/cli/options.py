@@ -1,6 +1,5 @@
 """What commands share: types of options, records that they read, warnings, and progress."""
 
-import logging
 import math
 import os
 import re
@@ -25,6 +24,7 @@ from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns
 from afm_scan_ros.files.paths import refuse_unwritable
 from afm_scan_ros.files.units import A_NUMBER, METRES, SECONDS, VOLTS, in_ascii
+from afm_scan_ros.report.terminal import complain, say, showing_log, visible
 
 CONFIG = share_directory() / "config"
 
@@ -71,7 +71,7 @@ def refuse_existing(*paths: Path, other: str = "folder") -> None:
 def warn(texts: Iterable[str]) -> None:
     """Write each text as a warning on stderr."""
     for text in texts:
-        click.echo(f"warning: {text}", err=True)
+        complain("warning", text)
 
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
@@ -121,13 +121,8 @@ def working(title: str, *, at_once: bool = True) -> Iterator[ProgressCallback]:
     Log messages of the package are shown too. Outside a terminal the first line comes ``at_once``,
     or after ``EVERY`` seconds, where the input may be refused soon.
     """
-    log, handler = logging.getLogger("afm_scan_ros"), _ToStderr()
-    log.addHandler(handler)
-    try:
-        with _progress_line(title, at_once=at_once) as report:
-            yield report
-    finally:
-        log.removeHandler(handler)
+    with showing_log(), _progress_line(title, at_once=at_once) as report:
+        yield report
 
 
 @contextmanager
@@ -136,18 +131,10 @@ def _progress_line(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
     if not console.is_terminal:
         yield in_lines(title, at_once=at_once)
         return
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(title)
-        yield lambda doing: progress.update(task, description=f"{title}: {doing}")
-
-
-class _ToStderr(logging.Handler):
-    """Shows what is logged as the commands show their own messages."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Write one line."""
-        click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
+        task = progress.add_task(visible(title))
+        yield lambda doing: progress.update(task, description=visible(f"{title}: {doing}"))
 
 
 def in_lines(
@@ -162,7 +149,7 @@ def in_lines(
         now = clock()
         if now >= due:
             due = now + EVERY
-            click.echo(f"{title}: {doing} ({now - began:.0f} s)", err=True)
+            say(f"{title}: {doing} ({now - began:.0f} s)", err=True)
 
     return report
 

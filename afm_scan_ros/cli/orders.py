@@ -1,7 +1,7 @@
 """What a scan or a record is made of, however it is run: by nodes, or in this process."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.plant_file import node_parameters
+from afm_scan_ros.nodes.parameters import NodeParameter
 
 COMPENSATOR, MONITOR = "inversion_compensator", "residual_monitor"
 
@@ -79,6 +80,12 @@ def refuse_pace(time_scale: float) -> None:
 def file_of(part: str) -> Path:
     """Return the file with the parameters of a part of a scan."""
     return CONFIG / f"{part}.yaml"
+
+
+def settings_of(part: str, parameters: Iterable[NodeParameter], own: Parameters) -> dict[str, Any]:
+    """Return a part's parameters: its own before those of its file, and these before defaults."""
+    given = {**parameters_of(part), **own}
+    return {each.name: given.get(each.name, each.default) for each in parameters}
 
 
 def parameters_of(part: str) -> dict[str, Any]:

@@ -26,7 +26,9 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.drive_files import make_folder, write_drives
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.plan_text import export_note, plan_table
+from afm_scan_ros.report.terminal import say
 
 
 def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -> None:
@@ -36,9 +38,9 @@ def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -
     """
     make_folder(folder, [plan.name for plan in plans])
     for path in write_drives(folder, plans, axes):
-        click.echo(f"wrote {path}", err=True)
+        say(f"wrote {path}", err=True)
     rates = [(plan.name, 1.0 / plan.sample_period) for plan in plans]
-    (folder / "README.md").write_text(export_note(rates, axes), "utf-8")
+    write_text(folder / "README.md", export_note(rates, axes))
 
 
 def covered(record: Path) -> Coverage:
@@ -154,7 +156,7 @@ def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> Non
     held = wanted.covered
     proposed = propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
     if not proposed:
-        click.echo("These records suffice.")
+        say("These records suffice.")
         return
     plans = [record.plan for record in proposed]
     if folder is not None:
@@ -162,7 +164,7 @@ def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> Non
     table = plan_table(proposed)
     table.show()
     if held.resonance is None:
-        click.echo(
+        say(
             "The resonance is unknown. Take the survey first, then run this command again with"
             " --have: it adds the frequency record and the validation record."
         )

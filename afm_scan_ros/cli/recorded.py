@@ -37,6 +37,7 @@ from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
 from afm_scan_ros.report.scan_report import adaptation_rows, error_tables, scan_report, scan_rows
 from afm_scan_ros.report.table import Rows, show
+from afm_scan_ros.report.terminal import say
 
 
 @click.command()
@@ -77,11 +78,11 @@ def analyze(
 
 
 def _show_comparison(found: Comparison, json_file: Path | None) -> None:
-    click.echo(f"{found.bag}: {found.samples} samples of a record '{found.record}'")
+    say(f"{found.bag}: {found.samples} samples of a record '{found.record}'")
     for axis in AXES:
         error: AxisComparison | None = getattr(found, axis)
         if error is not None:
-            click.echo(
+            say(
                 f"{axis}: achieved minus desired: rms {nanometres(error.rms)} nm, peak"
                 f" {nanometres(error.largest)} nm; mean {nanometres(error.mean)} nm, standard"
                 f" deviation {nanometres(error.spread)} nm; desired peak-to-peak"
@@ -137,7 +138,7 @@ def adapt(
         raise ScanError(f"{bag}: nothing has changed beyond the detection limit: no model written")
     changed = {name: with_shift(base.axis(name), shift) for name, shift in shifts.items()}
     model_file.save_model(out, evolve(base, **changed), HEADING.format(bag=bag.name))
-    click.echo(f"Model: {out}.")
+    say(f"Model: {out}.")
 
 
 @click.command()
@@ -200,4 +201,4 @@ def diagnose(
         progress("describing the residual")
         found.save(out)
     show(found.summary)
-    click.echo(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
+    say(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")

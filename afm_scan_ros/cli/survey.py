@@ -21,9 +21,11 @@ from afm_scan_ros.cli.workers import Outcome, WorkerOptions, worker_options
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.survey.changes import changes
 from afm_scan_ros.core.survey.recording import Recording
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.survey_files import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.report.survey import Survey, alert, page, summary
 from afm_scan_ros.report.table import show
+from afm_scan_ros.report.terminal import say
 
 PAGE = "survey.html"
 FALSE_ALARM = 0.01
@@ -117,7 +119,7 @@ class Surveyor:
     def _written(self, recordings: Sequence[Recording]) -> Survey:
         found = Survey(recordings, changes(recordings, self.false_alarm), self.false_alarm)
         self.folder.save_table(recordings)
-        self.folder.replace(self.folder.path / PAGE, page(found, datetime.now(UTC)).encode())
+        write_text(self.folder.path / PAGE, page(found, datetime.now(UTC)))
         return found
 
 
@@ -172,7 +174,7 @@ def survey(
     found = _watched(surveyor, bags, watching) if watching else _surveyed(surveyor, bags)
     if found is None:
         return
-    click.echo(f"Table: {out / TABLE}. Report: {out / PAGE}.")
+    say(f"Table: {out / TABLE}. Report: {out / PAGE}.")
     if found.changes or found.failed:
         raise ScanError(
             f"instruments that changed: {len(found.changed)}; recordings that could not be"

@@ -51,6 +51,22 @@ class DriveLimits:
                     )
 
 
+def refuse_step(drive: Trace, before: Mapping[str, float], largest: float) -> None:
+    """Raise ScanError for the first sample that is over ``largest`` (V) from the one before it.
+
+    ``before`` is the drive (V) of each axis one sample period before the block.
+    """
+    for axis in AXES:
+        steps = np.abs(np.diff(drive.axis(axis), prepend=before[axis]))
+        beyond = np.flatnonzero(~(steps <= largest))
+        if beyond.size:
+            raise ScanError(
+                f"sample {drive.first_sample + beyond[0]}, axis {axis}: the drive changes by"
+                f" {steps[beyond[0]]:.3g} V at once, and this scan needs no more than"
+                f" {largest:.3g} V"
+            )
+
+
 def _positive(suffix: str) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
     return field(validator=gt(0.0), metadata={"suffix": suffix})
 

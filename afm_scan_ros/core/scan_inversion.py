@@ -16,7 +16,8 @@ from afm_scan_ros.core.learning.line_feedback import LEAD, FedBack, LineFeedback
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import cut, end
+from afm_scan_ros.core.streams import MAX_BLOCK, cut, end
+from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
 
 
@@ -94,6 +95,21 @@ class ScanInversion:
         """The line that must be achieved before more can be driven; None where none must."""
         waiting = (each.awaited for each in (self._fed_back, self._adapted) if each is not None)
         return min((line for line in waiting if line is not None), default=None)
+
+    def largest_step(self, samples: int) -> float:
+        """Return the largest change of the drive (V) from a sample to the next, of the first ones.
+
+        Raises ScanError where it cannot be driven; the inversion is used up.
+        """
+        largest, before = 0.0, np.zeros((2, 1))
+        for first in range(0, samples, MAX_BLOCK):
+            for drive in self.desired(
+                desired(self._spec, first, min(MAX_BLOCK, samples - first)), last=False
+            ):
+                both = np.hstack([before, [drive.x, drive.y]])
+                largest = max(largest, float(np.max(np.abs(np.diff(both)), initial=0.0)))
+                before = both[:, -1:]
+        return largest
 
     def preflight(self, samples: int) -> Generator[str, None, None]:
         """Invert the first ``samples`` of the scan at rest; yield before each piece what it is.

@@ -1,7 +1,6 @@
 """The file of a learned correction: an .npz that states its scan and its model."""
 
 import json
-import zipfile
 from collections.abc import Collection
 from pathlib import Path
 
@@ -13,10 +12,13 @@ from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files.arrays import read_member
+from afm_scan_ros.files.arrays import open_archive, read_member
 from afm_scan_ros.files.model_file import model_hash
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
+
+LARGEST = 2**16
+"""Bytes of the text on what a correction was made for, a hundred times those that are written."""
 
 
 @frozen(eq=False)
@@ -49,15 +51,16 @@ def save_learned(path: Path, correction: Correction, model: ScannerModel) -> Non
     """Write a correction that was learned with a model."""
     made_for = {"scan": asdict(correction.spec), "model_hash": model_hash(model)}
     text = np.frombuffer(json.dumps(made_for).encode(), np.uint8)
-    with writing(path), path.open("wb") as stream:
+    with replacing(path) as beside, beside.open("wb") as stream:
         np.savez_compressed(stream, x=correction.x, y=correction.y, made_for=text)
 
 
 def load_learned(path: Path) -> StoredCorrection:
     """Read a correction; raises InputError where the file is damaged or is none."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            x, y, text = (read_member(archive, f"{name}.npy") for name in (*AXES, "made_for"))
+        with open_archive(path) as archive:
+            text = read_member(archive, "made_for.npy", LARGEST)
+            x, y = (read_member(archive, f"{name}.npy") for name in AXES)
         made_for = json.loads(text.astype(np.uint8).tobytes())
         spec = ScanSpec(**made_for["scan"])
         digest = str(made_for["model_hash"])

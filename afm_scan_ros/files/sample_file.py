@@ -1,5 +1,6 @@
 """A sample's heights from a file: an array of numbers, or any picture."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,11 @@ from afm_scan_ros.files.arrays import read_npy
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.simulation.sample import HeightMap
 
+PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "GIF", "WEBP", "PPM")
+"""Formats of pictures; others may run a program, as that of PostScript does."""
 LARGEST = 2**26  # bytes of a file
+MOST_PIXELS = 2**24
+"""Pixels of a picture, more than the samples of any line see of it."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue, ITU-R BT.709
 
 
@@ -41,14 +46,25 @@ def _brightness(path: Path) -> Array:
     from matplotlib.image import imread  # noqa: PLC0415 - slow to import, needed only here
 
     try:
+        _refuse_large(path)
         picture = imread(path)
     except Exception as error:  # Pillow raises whatever a damaged picture makes it run into
         raise InputError(f"{path}: not a picture that can be read: {error}") from error
     scale = np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 1.0
-    values = np.asarray(picture, dtype=np.float64) / scale
-    if values.ndim == 2:  # noqa: PLR2004 - grey
-        return values
-    if values.shape[2] < len(LUMINANCE):  # grey and alpha
-        return np.ascontiguousarray(values[..., 0])
-    result: Array = values[..., :3] @ np.array(LUMINANCE)
-    return result
+    if picture.ndim == 2:  # noqa: PLR2004 - grey
+        return np.asarray(picture, dtype=np.float64) / scale
+    weights = LUMINANCE if picture.shape[2] >= len(LUMINANCE) else (1.0,)  # grey and alpha
+    values = np.zeros(picture.shape[:2])
+    for colour, weight in enumerate(weights):
+        values += (weight / scale) * picture[..., colour]
+    return values
+
+
+def _refuse_large(path: Path) -> None:
+    """Raise ValueError for a picture that states more pixels than a sample needs."""
+    from PIL import Image  # noqa: PLC0415 - as matplotlib's reader
+
+    with warnings.catch_warnings(action="ignore"), Image.open(path, formats=PICTURES) as picture:
+        columns, rows = picture.size
+    if columns * rows > MOST_PIXELS:
+        raise ValueError(f"{columns} by {rows} pixels, over {MOST_PIXELS} in all: scale it down")

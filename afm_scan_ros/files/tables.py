@@ -1,6 +1,5 @@
 """Tables of numbers that no ROS recorded: text, and arrays of numpy and MATLAB."""
 
-import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -12,12 +11,15 @@ from scipy.io.matlab import matfile_version
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.arrays import check_elements, read_member, read_npy
-from afm_scan_ros.files.text_table import EVERY, RowRange, TextTable, read_text
+from afm_scan_ros.files.arrays import open_archive, read_member, read_npy
+from afm_scan_ros.files.matlab import check_elements
+from afm_scan_ros.files.text_table import EVERY, MOST_COLUMNS, RowRange, TextTable, read_text
 
 LEVEL_5 = 1
 """Major version of MATLAB's files since its version 5, except for 7.3."""
-GIVE = "give real numbers, the samples along the first axis"
+GIVE = (
+    f"give real numbers, the samples along the first axis and at most {MOST_COLUMNS} others beside"
+)
 
 
 @frozen(eq=False)
@@ -76,7 +78,7 @@ def read_table(path: Path, rows: RowRange = EVERY) -> NumberTable:
 def read_array(path: Path) -> ArrayTable:
     """Read an ``.npy`` file; raises InputError where it holds no array of real numbers."""
     array = read_npy(path)
-    if not _real(array):
+    if not _real(array) or array.size > MOST_COLUMNS * len(array):
         raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}: {GIVE}")
     return ArrayTable(path, (), tuple(array.reshape(len(array), -1).T))
 
@@ -84,7 +86,7 @@ def read_array(path: Path) -> ArrayTable:
 def read_archive(path: Path) -> ArrayTable:
     """Read the arrays of real numbers in an ``.npz`` file; raises InputError where none is."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_archive(path) as archive:
             names = archive.namelist()
             arrays = {name.removesuffix(".npy"): read_member(archive, name) for name in names}
     except Exception as error:  # zipfile raises whatever a damaged file makes it run into
@@ -133,6 +135,8 @@ def _table(path: Path, arrays: Mapping[str, Any]) -> ArrayTable:
         if not _real(array) or array.size == 1:
             continue
         samples = array.T if array.ndim == 2 and len(array) == 1 else array  # noqa: PLR2004 - a row
+        if array.size > MOST_COLUMNS * len(samples):
+            continue
         flat = samples.reshape(len(samples), -1).T
         numbered = len(flat) > 1
         columns |= {f"{name}[{k}]" if numbered else name: c for k, c in enumerate(flat, start=1)}

@@ -2,11 +2,12 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
@@ -14,6 +15,8 @@ from afm_scan_ros.files.units import is_unit
 
 LEAST = 2
 """Rows of a table, at least."""
+MOST_COLUMNS = 10_000
+"""Columns of a table, many times a converter's channels: what has more is no record."""
 
 
 @frozen
@@ -42,7 +45,9 @@ EVERY = RowRange()
 
 CHANCE = 0.01
 """Share of whole files without an end of line that may be taken for files cut short."""
-NUMBER = re.compile(r'\W*(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*')
+NUMBER = re.compile(
+    r'\W*+(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*'
+)
 
 
 def ends_within(cells: Sequence[str]) -> bool:
@@ -87,7 +92,7 @@ class TextTable:
     path: Path
     names: tuple[str, ...]
     separator: str | None
-    lines: Sequence[int] = field(repr=False)
+    lines: NDArray[np.intp] = field(repr=False)
     rows: Sequence[str] = field(repr=False)
     both_marks: bool = False
 
@@ -145,23 +150,22 @@ def read_text(path: Path, taken: RowRange) -> TextTable:
     """
     text = _text(path).replace("\r\n", "\n")
     lines = text.rstrip().split("\n")
-    numbered = [
-        (number, line)
-        for number, line in enumerate(lines, start=1)
-        if number > taken.skipped and not line.startswith(COMMENTS)
-    ]
-    while numbered and not numbered[0][1].strip():
-        del numbered[0]
-    if not numbered:
+    kept = [k for k in range(taken.skipped, len(lines)) if not lines[k].startswith(COMMENTS)]
+    filled = next((n for n, k in enumerate(kept) if lines[k].strip()), len(kept))
+    places = np.array(kept[filled:], dtype=np.intp)
+    if not places.size:
         after = f" after {taken.skipped} skipped lines" if taken.skipped else ""
         raise InputError(f"{path}: no rows{after}: give columns of drive and displacement")
-    sample = _sample([line for _, line in numbered])
+    sample = _sample([lines[k] for k in places])
     separator = _separator(sample)
     width, numeric = _columns(sample, separator)
-    first = _first_row(path, numbered, separator, width, numeric)
-    heading = lines[: numbered[first][0] - 1]
-    numbered = numbered[first:]
-    numbers, rows = zip(*numbered[taken.of(path, len(numbered))], strict=True)
+    if width > MOST_COLUMNS:
+        raise InputError(f"{path}: {width} columns, over {MOST_COLUMNS}: give a table of a record")
+    numbered = ((int(k) + 1, lines[k]) for k in places)
+    places = places[_first_row(path, numbered, separator, width, numeric) :]
+    heading = lines[: places[0]]
+    places = places[taken.of(path, len(places))]
+    numbers, rows = places + 1, tuple(lines[k] for k in places)
     if separator and all(row.endswith(separator) for row in rows):
         rows, width = tuple(row[:-1] for row in rows), width - 1
     open_end = numbers[-1] == len(lines) and not text[len(text.rstrip()) :].count("\n")
@@ -232,7 +236,7 @@ def _columns(sample: Sequence[str], separator: str | None) -> tuple[int, list[in
 
 def _first_row(
     path: Path,
-    numbered: Sequence[tuple[int, str]],
+    numbered: Iterable[tuple[int, str]],
     separator: str | None,
     width: int,
     numeric: Sequence[int],
@@ -260,7 +264,7 @@ def _first_row(
 
 def _refuse_ragged(
     path: Path,
-    numbers: Sequence[int],
+    numbers: NDArray[np.intp],
     rows: Sequence[str],
     separator: str | None,
     *,

@@ -10,10 +10,11 @@ METRES = {"pm": 1e-12, "nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
 _ALL = VOLTS | METRES | SECONDS
 
-A_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+A_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _FORM = re.compile(rf"(?P<factor>{A_NUMBER}|[-+])?\s*(?P<unit>[^\W\d]+)(?:/(?P<per>[^\W\d]+))?")
 _IN_NAME = re.compile(
-    r"(?P<name>.*?)\s*(?:\[(?P<a>[^]]*)\]|\((?P<b>[^)]*)\)|/\s*(?P<c>\w+)|_(?P<d>[^\W_]+))"
+    r"(?P<name>(?:.*?\S)?)\s*"
+    r"(?:\[(?P<a>[^][]*)\]|\((?P<b>[^()]*)\)|/\s*(?P<c>\w+)|_(?P<d>[^\W_]+))"
 )
 _SUFFIXES = {"v": "V", "mv": "mV", "kv": "kV", "uv": "uV"}
 """Suffixes of names, as ``drive_x_v``, are in small letters."""

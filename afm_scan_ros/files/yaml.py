@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.paths import write_text
 
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[Any] | dict[str, Any]
@@ -24,9 +25,11 @@ _LONGEST = 32
 """Characters of a whole number, more than any below 2**63 has in any base."""
 
 LARGEST = 2**20
-"""Characters of a file, a hundred times those of any that people write."""
+"""Bytes of a file, a hundred times those of any that people write."""
 DEEPEST = 20
 """Values within each other."""
+MOST_VALUES = 10**5
+"""Values of a file, keys among them; each takes a kilobyte and 40 µs until it is read."""
 
 _BOOL = re.compile(f"({'|'.join(sorted(_TRUE | _FALSE))})$")
 _NULL = re.compile("$")
@@ -106,7 +109,7 @@ for _tag, _pattern in {"null": _NULL, "bool": _BOOL, "int": _INT, "float": _FLOA
 
 class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers = _Rules.yaml_implicit_resolvers
-    _depth = 0
+    _depth = _values = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:  # noqa: ANN401 - PyYAML's own signature
         """Compose a value without aliases, which multiply, and tags, which change its type."""
@@ -118,8 +121,11 @@ class _Loader(yaml.SafeLoader):
             problem = f"a tag ({event.tag}); leave it out"
         elif self._depth == DEEPEST:
             problem = f"values nested more than {DEEPEST} deep"
+        elif self._values == MOST_VALUES:
+            problem = f"more than {MOST_VALUES} values; give a shorter file"
         if problem:
             raise _Refusal(problem=problem, problem_mark=event.start_mark)
+        self._values += 1
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -187,10 +193,7 @@ def _reason(error: yaml.MarkedYAMLError) -> str:
 
 def load(path: Path) -> dict[str, Any]:
     """Content of a YAML file that holds a mapping; raises InputError naming file and line."""
-    text = read_text(path)
-    if len(text) > LARGEST:
-        raise InputError(f"{path}: {len(text)} characters, over {LARGEST}; give a shorter file")
-    value = parse(text, str(path))
+    value = parse(read_text(path), str(path))
     if not isinstance(value, dict):
         raise InputError(f"{path}: expected 'key: value' lines, found {_kind(value)}")
     return value
@@ -200,12 +203,14 @@ def save(path: Path, content: Mapping[str, Any], heading: str) -> None:
     """Write a mapping so that ``load`` gives it back, below a heading as comments."""
     body = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=98)
     comment = "".join(f"# {line}\n" for line in heading.splitlines())
-    path.write_text(f"{comment}{body}", encoding="utf-8")
+    write_text(path, f"{comment}{body}")
 
 
 def read_text(path: Path) -> str:
-    """Text of a file; raises InputError where there is none."""
+    """Text of a file; raises InputError where there is none, or too much."""
     try:
+        if (size := path.stat().st_size) > LARGEST:
+            raise InputError(f"{path}: {size} bytes, over {LARGEST}; give a shorter file")
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None

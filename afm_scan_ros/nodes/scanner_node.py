@@ -9,6 +9,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.limits import refuse_step
 from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice
@@ -38,6 +39,12 @@ TIMEOUTS = (
         " for a block",
         low=0.1,
     ),
+    NodeParameter(
+        "step_limit_v",
+        0.0,
+        "Largest change of the drive between samples that the scan needs; 0 for the slew limit's",
+        low=0.0,
+    ),
 )
 
 
@@ -56,6 +63,7 @@ class ScannerNode(ManagedConsumer):
         self._queue: deque[tuple[Trace, bool]] = deque()
         self._moving: list[tuple[Trace, bool]] = []
         self._more_may_come = False
+        self._before = dict.fromkeys(AXES, 0.0)
         self._asked = self._driving = 0.0
         self.read([DRIVE])
         self.autostart()
@@ -117,7 +125,10 @@ class ScannerNode(ManagedConsumer):
         return super().step() or bool(self._moving)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
-        """Queue a block for the driver."""
+        """Queue a block for the driver; refuse a step that the scan cannot need."""
+        if largest := self.settings["step_limit_v"]:
+            refuse_step(block, self._before, largest)
+        self._before = {axis: float(block.axis(axis)[-1]) for axis in AXES}
         self._queue.append((block, last))
         self._more_may_come = True
 

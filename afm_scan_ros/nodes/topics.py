@@ -69,7 +69,12 @@ SCAN_INFO = NodeTopic("scan_info", ScanInfo, _latched(1), _latched(1))
 # Every node writes its own last state; a reader keeps those of many.
 NODE_STATE = NodeTopic("node_state", NodeState, _latched(1), _latched(100))
 # The last status is all that counts, so no reader can make a node wait.
-_LAST = QoSProfile(depth=1)
+_LAST = QoSProfile(
+    depth=1,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
 DIAGNOSTICS = NodeTopic("/diagnostics", DiagnosticArray, _LAST, QoSProfile(depth=100))
 
 BLOCKS = {topic.name: topic for topic in (DESIRED, DRIVE, ACHIEVED, TRUE)}

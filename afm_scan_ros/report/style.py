@@ -60,7 +60,7 @@ def blank(width: float, height: float, title: str = "") -> Figure:
     """Return a figure without panels, of a size in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     if title:
-        figure.suptitle(title, x=0.01, ha="left")
+        figure.suptitle(title, x=0.01, ha="left", parse_math=False)  # a name in a file
     return figure
 
 

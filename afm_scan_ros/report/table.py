@@ -5,13 +5,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-import click
 from attrs import frozen
 from matplotlib.figure import Figure
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table as RichTable
+from rich.text import Text
+
+from afm_scan_ros.files.paths import replacing, write_text
+from afm_scan_ros.report.terminal import say, visible
 
 Cell: TypeAlias = float | int | str
 Row: TypeAlias = Mapping[str, Cell]
@@ -19,6 +22,11 @@ Columns: TypeAlias = Mapping[str, tuple[str, str]]
 
 WIDEST_WORD = 24
 """Letters of a word that a narrow terminal does not break."""
+
+
+def cell(text: str, style: str = "") -> Text:
+    """Return text for a table or its title, in which brackets are no markup."""
+    return Text(visible(text), style)
 
 
 @frozen
@@ -31,12 +39,13 @@ class Rows:
 
     def show(self) -> None:
         """Print the rows on the terminal."""
-        shown = RichTable(box=None, pad_edge=False, title=self.title or None, title_justify="left")
+        title = cell(self.title, "table.title") if self.title else None
+        shown = RichTable(box=None, pad_edge=False, title=title, title_justify="left")
         for number, heading in enumerate(self.headings):
-            shown.add_column(heading, justify="right" if number else "left")
+            shown.add_column(cell(heading), justify="right" if number else "left")
         shown.show_header = bool(self.headings)
         for row in self.rows:
-            shown.add_row(*row)
+            shown.add_row(*map(cell, row))
         Console().print(shown)
 
 
@@ -65,26 +74,26 @@ class Table:
         shown = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
         text = self.text()
         columns = zip(text.headings, *text.rows, strict=True)
-        for (heading, *cells), (_, form) in zip(columns, self.columns.values(), strict=True):
-            words = " ".join([heading, *cells]).split()
+        for (heading, *entries), (_, form) in zip(columns, self.columns.values(), strict=True):
+            words = " ".join([heading, *entries]).split()
             width = min(WIDEST_WORD, max(len(word) for word in words))
             side: Literal["left", "right"] = "right" if form else "left"
-            shown.add_column(heading, justify=side, min_width=width, overflow="fold")
+            shown.add_column(cell(heading), justify=side, min_width=width, overflow="fold")
         for row in text.rows:
-            shown.add_row(*row)
+            shown.add_row(*map(cell, row))
         console = Console()
-        console.print(self.title, highlight=False, markup=False)
+        console.print(cell(self.title))
         least = Measurement.get(console, console.options, shown).minimum
         console.print(shown, width=max(console.width, least), crop=False)  # a number is never cut
         console.print()
 
     def save(self, folder: Path) -> None:
         """Write ``NAME.json`` and, where the table has a picture, ``NAME.png``."""
-        folder.mkdir(parents=True, exist_ok=True)
         document = {"title": self.title, "rows": self.rows}
-        (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
+        write_text(folder / f"{self.name}.json", json.dumps(document, indent=2) + "\n")
         if self.picture is not None:
-            self.picture().savefig(folder / f"{self.name}.png")
+            with replacing(folder / f"{self.name}.png") as beside:
+                self.picture().savefig(beside)
 
 
 Part: TypeAlias = str | Rows
@@ -97,4 +106,4 @@ def show(parts: Iterable[Part]) -> None:
         if isinstance(part, Rows):
             part.show()
         else:
-            click.echo(part)
+            say(part)

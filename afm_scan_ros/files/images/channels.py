@@ -20,10 +20,11 @@ from afm_scan_ros.files.units import METRES, in_ascii
 HEIGHT = re.compile(r"topo|height|z.?axis|z.?sensor|^z\b", re.IGNORECASE)
 """Names of channels that hold the height."""
 DIRECTION = re.compile(
-    r"[\s\[(_-]*(?P<back>retrace+|backward|bwd)[\s\])]*$|[\s\[(_-]*(trace+|forward|fwd)[\s\])]*$",
-    re.IGNORECASE,
+    r"(?:(?P<back>retrace+|backward|bwd)|trace+|forward|fwd)[\s\])]*$", re.IGNORECASE
 )
 """End of a title that states the direction, as in ``HeightRetrace`` or ``Z (Backward)``."""
+OPENING = " \t[(_-"
+"""What may stand between a name and its direction."""
 METRE = "m"
 LINE_TIME, SLOW_DIRECTION, OVERSCAN = "line_time_s", "slow_direction", "overscan"
 UPWARD = {"up": True, "down": False}
@@ -85,9 +86,8 @@ def paired(found: Iterable[Direction]) -> list[FoundChannel]:
 def split_title(title: str) -> tuple[str, bool]:
     """Return a title without its direction, and whether that is the retrace."""
     end = DIRECTION.search(title)
-    if end is None or not end.start():
-        return title, False
-    return title[: end.start()], end["back"] is not None
+    name = "" if end is None else title[: end.start()].rstrip(OPENING)
+    return (title, False) if end is None or not name else (name, end["back"] is not None)
 
 
 def _numbered(name: str, number: int) -> str:

@@ -17,6 +17,7 @@ from typing import Any
 
 import gwyfile
 import numpy as np
+from attrs import define
 from gwyfile.objects import GwyContainer, GwyDataField
 
 from afm_scan_ros.core.errors import InputError
@@ -31,6 +32,7 @@ from afm_scan_ros.files.images.channels import (
     metres,
     paired,
 )
+from afm_scan_ros.files.paths import replacing
 
 FIELD = re.compile(r"/(\d+)/data")
 TEXT = "s"
@@ -41,11 +43,13 @@ SIZES = {"b": 1, "c": 1, "i": 4, "q": 8, "d": 8}
 COUNT = struct.Struct("<I")
 DEEPEST = 20
 """Objects within objects; a channel's unit is the third."""
+MOST_PARTS = 10**5
+"""Components and texts of a file, each of which takes hundreds of bytes in memory."""
 
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels, paired by their titles; raises ValueError for a file cut short."""
-    _check_structure(path.read_bytes())
+    _Structure(path.read_bytes()).check()
     return paired(_directions(path, gwyfile.load(str(path))))
 
 
@@ -87,7 +91,8 @@ def write(
         container[f"/{number}/data/title"] = channel.title
         container.typecodes[f"/{number}/data/title"] = TEXT
         container[f"/{number}/meta"] = GwyContainer(dict(stated), dict.fromkeys(stated, TEXT))
-    container.tofile(str(path))
+    with replacing(path) as beside:
+        container.tofile(str(beside))
 
 
 def _data_field(channel: ImageChannel) -> GwyDataField:
@@ -102,57 +107,64 @@ def _data_field(channel: ImageChannel) -> GwyDataField:
     )
 
 
-def _check_structure(content: bytes) -> None:
-    """Raise ValueError where a file does not begin as one, or a part ends where it should not."""
-    if not content.startswith(MAGIC):
-        raise ValueError(f"it does not begin with {MAGIC.decode()}")
-    end = _object(content, len(MAGIC), len(content), DEEPEST)
-    if end != len(content):
-        raise ValueError(f"{len(content) - end} bytes follow what it states")
+@define
+class _Structure:
+    """The parts of a file; methods return where a part ends that begins at ``start``.
 
+    They raise ValueError where it would end beyond ``stop``, and for too many parts.
+    """
 
-def _object(content: bytes, start: int, stop: int, depth: int) -> int:
-    """Return where an object ends that begins at ``start`` and must end by ``stop``."""
-    if not depth:
-        raise ValueError(f"objects lie more than {DEEPEST} deep")
-    place = _text(content, start, stop)
-    size, place = _count(content, place, stop)
-    end = _within(place + size, stop)
-    while place < end:
-        place = _component(content, place, end, depth - 1)
-    return end
+    content: bytes
+    parts: int = 0
 
+    def check(self) -> None:
+        """Raise ValueError where a file does not begin as one, or a part ends elsewhere."""
+        if not self.content.startswith(MAGIC):
+            raise ValueError(f"it does not begin with {MAGIC.decode()}")
+        end = self._object(len(MAGIC), len(self.content), DEEPEST)
+        if end != len(self.content):
+            raise ValueError(f"{len(self.content) - end} bytes follow what it states")
 
-def _component(content: bytes, start: int, stop: int, depth: int) -> int:
-    place = _text(content, start, stop)
-    kind, place = content[place : place + 1].decode("latin-1"), _within(place + 1, stop)
-    if kind in SIZES:
-        return _within(place + SIZES[kind], stop)
-    count = 1
-    if kind.isupper():
-        count, place = _count(content, place, stop)
-    single = kind.lower()
-    if single in SIZES:
-        return _within(place + count * SIZES[single], stop)
-    if single not in ("s", "o"):
-        raise ValueError(f"byte {place}: '{kind}' is no type")
-    for _ in range(count):
-        text = single == "s"
-        place = _text(content, place, stop) if text else _object(content, place, stop, depth)
-    return place
+    def _object(self, start: int, stop: int, depth: int) -> int:
+        if not depth:
+            raise ValueError(f"objects lie more than {DEEPEST} deep")
+        place = self._text(start, stop)
+        size, place = self._count(place, stop)
+        end = _within(place + size, stop)
+        while place < end:
+            place = self._component(place, end, depth - 1)
+        return end
 
+    def _component(self, start: int, stop: int, depth: int) -> int:
+        place = self._text(start, stop)
+        kind, place = self.content[place : place + 1].decode("latin-1"), _within(place + 1, stop)
+        if kind in SIZES:
+            return _within(place + SIZES[kind], stop)
+        count = 1
+        if kind.isupper():
+            count, place = self._count(place, stop)
+        single = kind.lower()
+        if single in SIZES:
+            return _within(place + count * SIZES[single], stop)
+        if single not in ("s", "o"):
+            raise ValueError(f"byte {place}: '{kind}' is no type")
+        for _ in range(count):
+            place = self._text(place, stop) if single == "s" else self._object(place, stop, depth)
+        return place
 
-def _text(content: bytes, start: int, stop: int) -> int:
-    """Return where the text ends that begins at ``start``, its zero included."""
-    end = content.find(b"\0", start, stop)
-    if end < 0:
-        raise ValueError(f"byte {start}: a text has no end")
-    return end + 1
+    def _text(self, start: int, stop: int) -> int:
+        """Return where the text ends, its zero included."""
+        self.parts += 1
+        if self.parts > MOST_PARTS:
+            raise ValueError(f"it has more than {MOST_PARTS} parts")
+        end = self.content.find(b"\0", start, stop)
+        if end < 0:
+            raise ValueError(f"byte {start}: a text has no end")
+        return end + 1
 
-
-def _count(content: bytes, start: int, stop: int) -> tuple[int, int]:
-    end = _within(start + COUNT.size, stop)
-    return COUNT.unpack_from(content, start)[0], end
+    def _count(self, start: int, stop: int) -> tuple[int, int]:
+        end = _within(start + COUNT.size, stop)
+        return COUNT.unpack_from(self.content, start)[0], end
 
 
 def _within(end: int, stop: int) -> int:

@@ -30,10 +30,15 @@ from afm_scan_ros.files.units import A_NUMBER, SECONDS
 
 FRAMES = {"Scan forward": ("Forward", "trace"), "Scan backward": ("Backward", "retrace")}
 """Groups of the file, as NSFopen calls them, and the directions that they are."""
+HEADER_MARK = b"\n\r\n\r"
+"""What NSFopen takes for the end of the header."""
+LONGEST, LARGEST = 2**14, 2**28
+"""Bytes of a line, and those of all lines if each were as long: NSFopen takes as many."""
+NUMBERED = re.compile(rb"Count=(\d+)")
 DATA_MARK = b"\r\n#!"
 """What the header ends with; the samples of all channels follow."""
 QUANTITY = re.compile(rf"({A_NUMBER})\s*(\S*)")
-VECTOR = re.compile(r"[DV]\[([^],]*)[^]]*\]\*\[([^],]*)[^]]*\]")
+VECTOR = re.compile(r"[DV]\[([^],]*)(?:,[^]]*)?\]\*\[([^],]*)(?:,[^]]*)?\]")
 PERCENT = {"%": 0.01}
 UPWARD = {"Up": True, "Down": False}
 IMAGING = "DataSet\\Parameters\\Imaging"
@@ -43,6 +48,7 @@ Sections = Mapping[str, Mapping[str, str]]
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels; raises InputError for a file cut short and a scan that was stopped."""
+    _check_header(path.read_bytes().partition(HEADER_MARK)[0])
     found = nid_read(filename=str(path), dataframe=False)
     header: Sections = found.param["HeaderDump"]
     sections = list(_sections(header))
@@ -51,6 +57,16 @@ def read(path: Path) -> Sequence[FoundChannel]:
     if not images:
         raise InputError(f"{path}: holds no image, but other data: give a file of an image")
     return paired(_directions(path, header, sections, images))
+
+
+def _check_header(header: bytes) -> None:
+    """Raise ValueError for a header that NSFopen would read for ever, or in more memory."""
+    lines = header.split(b"\r\n")
+    longest = max(map(len, lines))
+    if longest > LONGEST or longest * len(lines) > LARGEST:
+        raise ValueError(f"{len(lines)} lines of up to {longest} bytes are no header")
+    if any(int(stated) > len(lines) for stated in NUMBERED.findall(header)):
+        raise ValueError("its header counts more than it has lines")
 
 
 def _sections(header: Sections) -> Iterator[Mapping[str, str]]:

@@ -5,7 +5,6 @@ lowest x. ``range_x``, ``range_y`` (m), ``line_time`` (s), ``upward``, ``oversca
 ``unit`` are single values. All but ``trace`` and the ranges may be left out.
 """
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.arrays import read_member
+from afm_scan_ros.files.arrays import open_archive, read_member
 from afm_scan_ros.files.images.channels import FoundChannel, ScanFacts, in_si
 from afm_scan_ros.files.records import refuse_unknown
 
@@ -24,7 +23,7 @@ FURTHER = ("retrace", "line_time", "upward", "overscan", "channel", "unit")
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read the only channel; raises InputError for a name that is missing or unknown."""
-    with zipfile.ZipFile(path) as archive:
+    with open_archive(path) as archive:
         names = [name.removesuffix(".npy") for name in archive.namelist()]
         refuse_unknown(names, NEEDED + FURTHER, str(path))
         for name in NEEDED:

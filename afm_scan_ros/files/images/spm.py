@@ -29,6 +29,8 @@ HEADER_END = re.compile(rb"^\\\*File list end\s*$", re.MULTILINE)
 """The header's last line; pySPM would look for it for ever."""
 SCAN_RATE = re.compile(rf"\\Scan Rate: ({A_NUMBER})".encode())
 TITLE = re.compile(r'.*"([^"]*)"')
+LENGTH = b"Data length"
+"""Bytes of a channel, which lie nowhere else."""
 UPWARD = {"Up": True, "Down": False}
 BACK = {"Trace": False, "Retrace": True}
 
@@ -45,7 +47,13 @@ def read(path: Path) -> Sequence[FoundChannel]:
         )
     rate = SCAN_RATE.search(content, 0, end.start())
     line_time = None if rate is None else 1.0 / float(rate[1])
-    return paired(_directions(path, pySPM.Bruker(str(path)), line_time))
+    scan = pySPM.Bruker(str(path))
+    stated = sum(int(layer.get(LENGTH, [b"0"])[0]) for layer in scan.layers)
+    if stated > len(content):
+        raise InputError(
+            f"{path}: states {stated} bytes of samples, more than it has: copy it again"
+        )
+    return paired(_directions(path, scan, line_time))
 
 
 def _directions(path: Path, scan: pySPM.Bruker, line_time: float | None) -> Iterator[Direction]:

@@ -17,8 +17,10 @@ import pySPM
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.images.channels import Direction, FoundChannel, ScanFacts, in_si, paired
 
-HEADER_END = re.compile(rb"^:SCANIT_END:\s*\n[^\x1a]*\x1a\x04", re.MULTILINE)
-"""What follows the header; pySPM would look for it for ever."""
+HEADER_END, BEGINNING = re.compile(rb"^:SCANIT_END:\s*$", re.MULTILINE), b"\x1a\x04"
+"""What ends the header and begins the samples; pySPM would look for either for ever."""
+PIXEL = 4
+"""Bytes of a sample."""
 UPWARD = {"up": True, "down": False}
 BOTH = {"both": ("forward", "backward")}
 
@@ -27,10 +29,22 @@ Header = Mapping[str, Sequence[Sequence[str]]]
 
 def read(path: Path) -> Sequence[FoundChannel]:
     """Read all channels; raises InputError for a file without the end of its header."""
-    if not HEADER_END.search(path.read_bytes()):
+    content = path.read_bytes()
+    end = HEADER_END.search(content)
+    start = -1 if end is None else content.find(BEGINNING[:1], end.end())
+    if content[start : start + 2] != BEGINNING:
         raise InputError(f"{path}: has no end of a Nanonis header, it was cut short: copy it again")
     scan = pySPM.SXM(str(path))
+    _refuse_more(path, scan, len(content) - start - len(BEGINNING))
     return paired(_directions(path, scan))
+
+
+def _refuse_more(path: Path, scan: Any, held: int) -> None:  # noqa: ANN401 - pySPM is not typed
+    """Raise InputError where channels state more than the bytes that the file holds of samples."""
+    ways = sum(len(BOTH.get(row[3], (row[3],))) for row in scan.header["DATA_INFO"][1:])
+    stated = PIXEL * ways * scan.size["pixels"]["x"] * scan.size["pixels"]["y"]
+    if not 0 < stated <= held:
+        raise InputError(f"{path}: states {stated} bytes of samples, {held} follow: copy it again")
 
 
 def _directions(path: Path, scan: Any) -> Iterator[Direction]:  # noqa: ANN401 - pySPM is not typed
