@@ -26,6 +26,8 @@ from afm_scan_ros.nodes.topics import NODE_STATE
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NICENESS = -11
 """Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
+DISCOVERY = 1.0
+"""Longest wait, s, for a reader of the state of a node that cannot be made."""
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
@@ -88,6 +90,9 @@ def _report_refusal(name: str, error: InputError) -> None:
     node = Node(name)
     publisher = node.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
     node.get_logger().error(f"{FAILED}: {error}")
+    deadline = time.monotonic() + DISCOVERY
+    while not publisher.get_subscription_count() and time.monotonic() < deadline:
+        time.sleep(IDLE)
     publisher.publish(state_message(None, node.get_name(), FAILED, 0, str(error)))
     Diagnostics(node).publish(FAILED, str(error), dict)
     time.sleep(LINGER)

@@ -1,7 +1,8 @@
 """A domain of the tests' own, on this machine alone; a small scan; all needs ROS."""
 
-import os
+import socket
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn
@@ -22,6 +23,10 @@ SPEC = """\
     block_size: 500
     window: 5000
 """
+DOMAINS = range(215, 232)
+"""Of ROS, beyond those that a command takes for itself; no system hands their ports out."""
+CLAIM = 249
+"""Port of a domain that no participant takes, for none is its hundredth."""
 PATIENT = {"liveness_timeout_s": 5.0, "progress_timeout_s": 5.0}
 DRIVING = {"upstream_timeout_s": 5.0}
 """Parameters of nodes, and of those that drive a scanner."""
@@ -43,11 +48,22 @@ if find_spec("rclpy") is None:
         return made
 
 
+@pytest.fixture(scope="session")
+def own_domain() -> Iterator[int]:
+    """Claim a domain, by a port that no test takes which has another."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as claimed:
+        for domain in DOMAINS:
+            with suppress(OSError):
+                claimed.bind(("127.0.0.1", 7400 + 250 * domain + CLAIM))
+                yield domain
+                return
+    pytest.fail("all domains of the tests are in use")
+
+
 @pytest.fixture(autouse=True)
-def domain(monkeypatch: pytest.MonkeyPatch) -> None:
+def domain(own_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Share a domain with the nodes that a test starts, and with nobody else."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")  # two that run at once never meet
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + 4 * (os.getppid() % 25) + int(worker[2:]) % 4))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(own_domain))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 

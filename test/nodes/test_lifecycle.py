@@ -177,9 +177,8 @@ def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) 
     node = PiezoscannerSim()
     node.begin(INFO)
     block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
-    with pytest.raises(
-        ScanError, match=r"^drive_voltage: a block came while this node waits to be configured$"
-    ):
+    said = "drive_voltage: a block came while this node waits to be configured"
+    with pytest.raises(ScanError, match=f"^{said}$"):
         node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False), 1)
     node.destroy_node()
     assert (node.state, node.reason) == (FAILED, "deactivated at sample 0")

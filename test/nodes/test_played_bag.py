@@ -55,7 +55,7 @@ def test_a_pause_ends_no_reader(
     gone = ("trajectory_generator", *READERS)
     info = evolve(info_of_scan(SPEC, "played", 10**18), nodes=gone, window=4 * BLOCK)
     topics = {topic: publisher(player, topic) for topic in (SCAN_INFO, NODE_STATE, *streams)}
-    wanted = {DESIRED: 2, DRIVE: 2, ACHIEVED: 3}
+    wanted = {DESIRED: 2, DRIVE: 2, ACHIEVED: 3, SCAN_INFO: 3}
     until(lambda: all(topics[t].get_subscription_count() == n for t, n in wanted.items()), player)
     topics[SCAN_INFO].publish(info_message(info))
     for first in range(0, done.desired.x.size, BLOCK):

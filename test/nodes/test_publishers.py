@@ -98,6 +98,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
         "min_true_subscriptions": 0,
         "upstream_timeout_s": 5.0,
         "liveness_timeout_s": 5.0,
+        "progress_timeout_s": 5.0,
     }
     made: list[Scan] = []
 

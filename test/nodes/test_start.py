@@ -7,7 +7,8 @@ import sys
 import pytest
 from rclpy.node import Node
 
-from afm_scan_ros.nodes.topics import NODE_STATE
+from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
+from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 from helpers.ros import PATIENCE, joined, until
 
 SLOW_IMPORT = """
@@ -80,3 +81,20 @@ def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> No
     assert node.returncode == 2
     assert [(each.node, each.state) for each in heard] == [("scan_imager", "failed")]
     assert last == f"scan_imager: {heard[0].reason}"
+
+
+def test_a_scan_is_announced_once_its_source_can_be_heard() -> None:
+    """A reader that knows of the scan then misses its source by right."""
+    with joined():
+        listener, generator = Node("listener"), TrajectoryGenerator()
+        heard = []
+        for topic in (SCAN_INFO, NODE_STATE):
+            listener.create_subscription(topic.kind, topic.name, heard.append, topic.reader)
+        until(lambda: listener.count_publishers("/scan_info"), listener)
+        generator.report()
+        until(lambda: heard, listener)
+        assert {type(each) for each in heard} == {NODE_STATE.kind}
+        generator.step()
+        until(lambda: type(heard[-1]) is SCAN_INFO.kind, listener)
+        generator.destroy_node()
+        listener.destroy_node()
