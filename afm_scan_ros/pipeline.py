@@ -195,12 +195,11 @@ class _Flow:
     def _take(self, wait: float) -> None:
         """Take the driver's answer, if it is there within ``wait`` s, and let it move on."""
         with _part(self._chain.scanner):
-            if not self._moving:
-                self._driver.show_life()
-                self._pause(wait)
-                return
-            answer = self._driver.answer(wait)
-        if answer is not None:
+            self._driver.show_life()
+            answer = self._driver.answer(wait) if self._moving else None
+        if not self._moving:
+            self._pause(wait)
+        elif answer is not None:
             moved, self._moving = self._moving, []
             self._move_on()
             self._follow(answer, moved)
@@ -210,8 +209,9 @@ class _Flow:
         line = self._chain.inversion.awaited if self._chain.inversion else None
         if line is not None and not self._queue:
             raise ScanError(
-                f"the next line waits for the end of line {line}, which the scanner has not read:"
-                " feedback_latency_ms is less than the scanner's latency; give more"
+                f"{COMPENSATOR}: the next line waits for the end of line {line}, which"
+                f" {self._chain.scanner} has not read: feedback_latency_ms is less than the"
+                " scanner's latency; give more"
             )
         time.sleep(min(wait, max(0.0, self._early())) if self._queue else wait)
 

@@ -27,7 +27,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import USE_OF_PATH, TableRecord, read_table_record
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.text_table import RowRange
 from afm_scan_ros.report.terminal import say
 
@@ -172,5 +172,5 @@ def invert(
 def _write(out: Path, axes: tuple[str, ...], period: float, drive: np.ndarray) -> None:
     heading = ",".join(["time_s", *(f"drive_{axis}_v" for axis in axes)])
     table = np.column_stack([period * np.arange(len(drive)), drive])
-    with writing(out):
-        np.savetxt(out, table, fmt="%.9g", delimiter=",", header=heading, comments="")
+    with replacing(out) as beside:
+        np.savetxt(beside, table, fmt="%.9g", delimiter=",", header=heading, comments="")

@@ -35,6 +35,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import load_plant, load_scan, save_scan
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.close_loop import close_loop_page, final_text, reported, round_result
@@ -230,7 +231,7 @@ def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "
     made = {"provenance": plain(of)}
     save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
-    (out / "report.html").write_text(close_loop_page(done, of, failure), "utf-8")
+    write_text(out / "report.html", close_loop_page(done, of, failure))
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)
@@ -336,4 +337,4 @@ def _write(
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
-    (out / "report.html").write_text(learning_page(done, taught, of, failure), "utf-8")
+    write_text(out / "report.html", learning_page(done, taught, of, failure))

@@ -26,6 +26,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.drive_files import make_folder, write_drives
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report.plan_text import export_note, plan_table
 from afm_scan_ros.report.terminal import say
 
@@ -39,7 +40,7 @@ def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -
     for path in write_drives(folder, plans, axes):
         say(f"wrote {path}", err=True)
     rates = [(plan.name, 1.0 / plan.sample_period) for plan in plans]
-    (folder / "README.md").write_text(export_note(rates, axes), "utf-8")
+    write_text(folder / "README.md", export_note(rates, axes))
 
 
 def covered(record: Path) -> Coverage:

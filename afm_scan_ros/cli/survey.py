@@ -21,6 +21,7 @@ from afm_scan_ros.cli.workers import Outcome, WorkerOptions, worker_options
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.survey.changes import changes
 from afm_scan_ros.core.survey.recording import Recording
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.survey_files import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.report.survey import Survey, alert, page, summary
 from afm_scan_ros.report.table import show
@@ -118,7 +119,7 @@ class Surveyor:
     def _written(self, recordings: Sequence[Recording]) -> Survey:
         found = Survey(recordings, changes(recordings, self.false_alarm), self.false_alarm)
         self.folder.save_table(recordings)
-        self.folder.replace(self.folder.path / PAGE, page(found, datetime.now(UTC)).encode())
+        write_text(self.folder.path / PAGE, page(found, datetime.now(UTC)))
         return found
 
 

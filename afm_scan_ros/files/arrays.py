@@ -122,6 +122,12 @@ def read_member(archive: zipfile.ZipFile, name: str, most: float = math.inf) -> 
 LARGEST = 2**24  # bytes, a matrix of 1448 rows
 
 
+def sha256_of(path: Path) -> str:
+    """Digest of a file, as ``sha256sum`` prints it."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 class Archive:
     """The .npz file beside a model file; raises InputError for what cannot be trusted in it."""
 
@@ -151,7 +157,7 @@ class Archive:
 
     def refuse_others(self, sha256: str) -> None:
         """Raise InputError for another digest, unless it is empty, and for arrays not read."""
-        if sha256 not in ("", self.sha256()):
+        if sha256 not in ("", sha256_of(self._path)):
             raise InputError(
                 f"arrays_sha256 is not that of {self._path.name}, so these arrays are of another"
                 " model: restore its own arrays, or delete arrays_sha256 if these are right"
@@ -162,11 +168,6 @@ class Archive:
                 f"{self._path.name} holds {', '.join(unread)}, which the file does not name: bring"
                 " the whole file back, or take these arrays out"
             )
-
-    def sha256(self) -> str:
-        """Digest of the whole file, as ``sha256sum`` prints it."""
-        with self._path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
 
     def _array(self, name: str) -> Array:
         try:

@@ -11,7 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.timing import timing_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.images.channels import Signal
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
 from afm_scan_ros.files.text_table import RowRange
@@ -298,7 +298,7 @@ EXACT = "%.17g"
 def write_signals(path: Path, signals: Sequence[Signal]) -> None:
     """Write signals of one length as columns, with headings as ``drive_x [V]``."""
     rows = len(signals[0].values)
-    with writing(path), path.open("w", encoding="utf-8") as file:
+    with replacing(path) as beside, beside.open("w", encoding="utf-8") as file:
         file.write(",".join(f"{each.name} [{each.unit}]" for each in signals) + "\n")
         for first in range(0, rows, BLOCK):
             block = [each.values[first : first + BLOCK] for each in signals]

@@ -15,9 +15,8 @@ from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.model_file import AddedEffect, listed, save_arrays, values_of
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.model_file import AddedEffect, listed, values_of
+from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 MATRICES = ("a", "b", "c", "d")
@@ -67,15 +66,16 @@ def save_coupled(path: Path, scanner: CoupledScanner, heading: str) -> None:
             for effect in scanner.effects
         ),
     )
-    with writing(path):
-        file = _CoupledFile(content, *save_arrays(path, matrices))
-        yaml.save(path, to_mapping(file), heading)
+    with saved_arrays(path, matrices) as (beside, digest):
+        file = _CoupledFile(content, beside, digest)
+        yaml.save(path, sealed(to_mapping(file)), heading)
 
 
 def load_coupled(path: Path) -> CoupledScanner:
     """Model of a file; raises InputError naming the file, the key and the fix."""
-    content = from_mapping(_CoupledFile, yaml.load(path), str(path))
-    given, archive = content.coupled, Archive(path.parent / content.arrays)
+    content = from_mapping(_CoupledFile, load_sealed(path), str(path))
+    given = content.coupled
+    archive = arrays_beside(path, content.arrays, content.arrays_sha256)
     a, b, c, d = (archive.matrix(name) for name in MATRICES)
     scale, elongation = archive.matrix("drive_scale"), archive.matrix("elongation")
     with naming(path):

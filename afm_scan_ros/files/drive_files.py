@@ -10,6 +10,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_
 from afm_scan_ros.core.identification.drives.waveforms import Sampled, Waveform
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files.arrays import open_archive, read_member
+from afm_scan_ros.files.paths import replacing
 
 DRIVE, PERIOD = "drive_v", "sample_period_s"
 BLOCK = 100_000
@@ -47,17 +48,15 @@ def write_drives(
 
 def _write(target: Path, plan: Plan[Waveform], axes: Sequence[str]) -> None:
     blocks: list[Array] = []
-    with target.open("w", encoding="utf-8") as file:
+    with replacing(target) as beside, beside.open("w", encoding="utf-8") as file:
         file.write(",".join(f"drive_{axis}_v" for axis in axes) + "\n")
         for first in range(0, plan.total_samples, BLOCK):
             block = excitation_block(plan, first, BLOCK)
             blocks.append(np.column_stack([block.axis(axis) for axis in axes]))
             np.savetxt(file, blocks[-1], fmt="%.7g", delimiter=",")
-    np.savez_compressed(
-        target.with_suffix(".npz"),
-        drive_v=np.vstack(blocks),
-        sample_period_s=np.array(plan.sample_period),
-    )
+    period = np.array(plan.sample_period)
+    with replacing(target.with_suffix(".npz")) as beside:
+        np.savez_compressed(beside, drive_v=np.vstack(blocks), sample_period_s=period)
 
 
 def save_drive(folder: Path, plan: Plan[Waveform]) -> Path:
@@ -68,7 +67,8 @@ def save_drive(folder: Path, plan: Plan[Waveform]) -> Path:
     target = folder / f"{plan.name}.npz"
     block = excitation_block(plan, 0, plan.total_samples)
     drive = np.column_stack([block.x, block.y])
-    np.savez(target, drive_v=drive, sample_period_s=np.array(plan.sample_period))
+    with replacing(target) as beside:
+        np.savez(beside, drive_v=drive, sample_period_s=np.array(plan.sample_period))
     return target
 
 

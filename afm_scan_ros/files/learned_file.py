@@ -14,7 +14,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.arrays import open_archive, read_member
 from afm_scan_ros.files.model_file import model_hash
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
 
 LARGEST = 2**16
@@ -51,7 +51,7 @@ def save_learned(path: Path, correction: Correction, model: ScannerModel) -> Non
     """Write a correction that was learned with a model."""
     made_for = {"scan": asdict(correction.spec), "model_hash": model_hash(model)}
     text = np.frombuffer(json.dumps(made_for).encode(), np.uint8)
-    with writing(path), path.open("wb") as stream:
+    with replacing(path) as beside, beside.open("wb") as stream:
         np.savez_compressed(stream, x=correction.x, y=correction.y, made_for=text)
 
 

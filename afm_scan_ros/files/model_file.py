@@ -49,7 +49,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, refuse_unknown, to_mapping
 
 FORMER_KINDS = {
@@ -255,8 +255,8 @@ class _File:
 
 def load_model(path: Path) -> ScannerModel:
     """Model of a file; raises InputError naming the file, the key and the fix."""
-    content = from_mapping(_File, yaml.load(path), str(path))
-    arrays = Archive(path.parent / content.arrays)
+    content = from_mapping(_File, load_sealed(path), str(path))
+    arrays = arrays_beside(path, content.arrays, content.arrays_sha256)
     axes = {}
     with naming(path):
         for name in AXES:
@@ -283,24 +283,11 @@ def save_model(path: Path, model: ScannerModel, heading: str) -> None:
     """Write the model and, beside it, its arrays in ``path`` with the ending ``.npz``."""
     arrays: Arrays = {}
     axes = {name: _axis_to(model.axis(name), name, arrays) for name in model.axes}
-    with writing(path):
-        beside, digest = save_arrays(path, arrays)
+    with saved_arrays(path, arrays) as (beside, digest):
         content = _File(
             sensor_sensitivity=SENSOR_SENSITIVITY, arrays=beside, arrays_sha256=digest, **axes
         )
-        yaml.save(path, to_mapping(content), heading)
-
-
-def save_arrays(path: Path, arrays: Arrays) -> tuple[str, str]:
-    """Write the arrays beside a model file; return the name and the digest of theirs.
-
-    Raises InputError where the model file itself has that name, or cannot be written.
-    """
-    beside = path.with_suffix(".npz")
-    if beside == path or path.is_dir():
-        raise InputError(f"{path}: give the name of a file, as model.yaml; its arrays are in .npz")
-    np.savez(beside, **arrays)  # type: ignore[arg-type] # its stub takes a name for an option
-    return beside.name, Archive(beside).sha256()
+        yaml.save(path, sealed(to_mapping(content)), heading)
 
 
 def model_hash(model: ScannerModel | CoupledScanner) -> str:

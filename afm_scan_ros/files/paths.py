@@ -2,8 +2,9 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 
 from afm_scan_ros.core.errors import InputError
 
@@ -31,10 +32,44 @@ def writing(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: {reason}: give another file or folder") from None
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file of text; otherwise as ``writing``."""
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the path of a file to write, which then takes the place of one at ``path``.
+
+    It lies beside it, of the same suffix. Whoever is killed at any moment leaves the old file or
+    the new one. What is no ordinary file, as ``/dev/stdout``, is written itself. Otherwise as
+    ``writing``.
+    """
     with writing(path):
-        path.write_text(text, "utf-8")
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            yield path
+            return
+        beside = target.with_name(f".{target.stem}.{token_hex(4)}{target.suffix}")
+        try:
+            yield beside
+            with beside.open("rb") as written:
+                os.fsync(written.fileno())
+            beside.replace(target)
+        finally:
+            beside.unlink(missing_ok=True)
+        flush(target.parent)
+
+
+def flush(folder: Path) -> None:
+    """Have the operating system keep the names in a folder, where it can."""
+    with suppress(OSError):
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file of text; otherwise as ``replacing``."""
+    with replacing(path) as beside:
+        beside.write_text(text, "utf-8")
 
 
 def refuse_unwritable(path: Path) -> None:

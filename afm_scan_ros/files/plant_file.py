@@ -10,7 +10,6 @@ from attrs import evolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.paths import writing
 from afm_scan_ros.files.records import from_mapping, refuse_unknown, to_mapping
 from afm_scan_ros.simulation.mechanisms import mechanism_type
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -37,8 +36,7 @@ def load_scan(path: Path, others: Collection[str] = ()) -> tuple[ScanSpec, dict[
 
 def save_scan(path: Path, spec: ScanSpec, heading: str) -> None:
     """Write a scan file, and its folder where there is none."""
-    with writing(path):
-        yaml.save(path, {f"/**/{NODE}": {PARAMETERS: to_mapping(spec)}}, heading)
+    yaml.save(path, {f"/**/{NODE}": {PARAMETERS: to_mapping(spec)}}, heading)
 
 
 def node_parameters(content: Mapping[str, Any], where: str, node: str = NODE) -> dict[str, Any]:

@@ -1,7 +1,4 @@
-"""The folder of a survey: a JSON file for each recording, and a Parquet table of all.
-
-Each file is written beside its place and renamed, so that whoever is killed leaves no half file.
-"""
+"""The folder of a survey: a JSON file for each recording, and a Parquet table of all."""
 
 import json
 from collections.abc import Iterable
@@ -14,6 +11,7 @@ from attrs import frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.survey.recording import Recording
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.paths import replacing, write_text
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 TABLE, ROWS = "survey.parquet", "recordings"
@@ -46,7 +44,7 @@ class SurveyFolder:
     def keep(self, name: str, recording: Recording) -> None:
         """Write a recording in place of what was kept by this name."""
         document = json.dumps(to_mapping(recording), indent=1, allow_nan=False)
-        self.replace(self.path / ROWS / f"{name}.json", document.encode())
+        write_text(self.path / ROWS / f"{name}.json", document)
 
     def save_table(self, recordings: Iterable[Recording]) -> None:
         """Write the table, a row for each recording."""
@@ -54,22 +52,14 @@ class SurveyFolder:
         from pyarrow import parquet  # noqa: PLC0415 - of an extra
 
         table = pa.Table.from_pylist([_row(each) for each in recordings], schema=_schema(pa))
-        sink = pa.BufferOutputStream()
-        parquet.write_table(table, sink)
-        self.replace(self.path / TABLE, sink.getvalue().to_pybytes())
-
-    def replace(self, file: Path, content: bytes) -> None:
-        """Write a file whole, or leave the one before."""
-        file.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = file.with_name(f"{file.name}.unfinished")
-        unfinished.write_bytes(content)
-        unfinished.replace(file)
+        with replacing(self.path / TABLE) as beside:
+            parquet.write_table(table, beside)
 
 
 def _read(file: Path) -> Recording:
     try:
         content = json.loads(file.read_text("utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: {error}: remove it, and run the survey again") from error
     return from_mapping(Recording, content, str(file))
 

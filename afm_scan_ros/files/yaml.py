@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.paths import write_text
 
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[Any] | dict[str, Any]
@@ -202,7 +203,7 @@ def save(path: Path, content: Mapping[str, Any], heading: str) -> None:
     """Write a mapping so that ``load`` gives it back, below a heading as comments."""
     body = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=98)
     comment = "".join(f"# {line}\n" for line in heading.splitlines())
-    path.write_text(f"{comment}{body}", encoding="utf-8")
+    write_text(path, f"{comment}{body}")
 
 
 def read_text(path: Path) -> str:

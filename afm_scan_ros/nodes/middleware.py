@@ -81,6 +81,8 @@ SEGMENT = 32 * 2**20
 """Bytes of shared memory of a participant; config/fastdds.xml argues this and what follows."""
 HEARTBEAT = 0.1
 """Longest heartbeat, s: a lost block has to come again within the scan's window of 0.4 s."""
+REPEAT = 0.1
+"""Least time, s, until a message is sent again: a reader that hangs asks at each heartbeat."""
 KEPT = 15_000
 """Messages that a writer keeps for a reader that does not acknowledge."""
 
@@ -152,13 +154,17 @@ def _lacks_heartbeats(root: ET.Element) -> Iterator[str]:
     if writer is None:
         yield (
             "no data_writer is the default profile: give one with heartbeatPeriod of at most"
-            f" {HEARTBEAT:g} s and max_samples of at least {KEPT}"
+            f" {HEARTBEAT:g} s, nackSupressionDuration of at least {REPEAT:g} s and max_samples of"
+            f" at least {KEPT}"
         )
         return
     period = writer.find("times/heartbeatPeriod")
     seconds = 3.0 if period is None else _seconds(period)
     if seconds > HEARTBEAT:
         yield f"heartbeatPeriod is {seconds:g} s: give at most {HEARTBEAT:g} s"
+    repeat = writer.find("times/nackSupressionDuration")
+    if (pause := 0.0 if repeat is None else _seconds(repeat)) < REPEAT:
+        yield f"nackSupressionDuration is {pause:g} s: give at least {REPEAT:g} s"
     kept = writer.find("topic/resourceLimitsQos/max_samples")
     samples = 5000.0 if kept is None else _number(kept)
     if 0.0 < samples < KEPT:  # 0 and less are no limit

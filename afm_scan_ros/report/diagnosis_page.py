@@ -23,6 +23,7 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.coupled_file import save_coupled
 from afm_scan_ros.files.model_file import save_model
+from afm_scan_ros.files.paths import replacing, write_text
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
@@ -162,9 +163,10 @@ def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Prove
     save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
     head = f"{heading}\n{heading_lines(of)}"
     save_model(folder / "model.extended.yaml", found.diagnosis.model, head)
-    (folder / "report.html").write_text(diagnosis_page(found, drawn, of), "utf-8")
+    write_text(folder / "report.html", diagnosis_page(found, drawn, of))
     for axis, content in drawn.items():
-        (folder / f"residual_{axis}.png").write_bytes(content)
+        with replacing(folder / f"residual_{axis}.png") as beside:
+            beside.write_bytes(content)
 
 
 COUPLED_ROWS = ("effect", "probability", "share of the residual's\nmean square, %")
@@ -228,7 +230,7 @@ def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Prove
     )
     warnings = map(html.warning, of.shortcomings)
     page = html.page("Diagnosis of coupled axes", *warnings, *parts, *provenance_section(of))
-    (folder / "report.html").write_text(page, "utf-8")
+    write_text(folder / "report.html", page)
 
 
 def coupled_document(found: CoupledDiagnosis) -> dict[str, Any]:

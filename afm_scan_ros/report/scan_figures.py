@@ -18,7 +18,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import TO_AND_FRO, SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.files.paths import writing
+from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.report.analysis import DESIRED, scan_spec
 from afm_scan_ros.report.style import (
     BLUE,
@@ -129,8 +129,8 @@ def save(figure: Figure, path: Path) -> None:
     known = figure.canvas.get_supported_filetypes()
     if path.suffix.removeprefix(".") not in known:
         raise InputError(f"{path}: unknown kind of picture: end it in .png, .svg or .pdf")
-    with writing(path):
-        figure.savefig(path, dpi=160)
+    with replacing(path) as beside:
+        figure.savefig(beside, dpi=160)
 
 
 def _over_time(

@@ -13,6 +13,7 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from afm_scan_ros.files.paths import replacing, write_text
 from afm_scan_ros.report.terminal import say, visible
 
 Cell: TypeAlias = float | int | str
@@ -88,11 +89,11 @@ class Table:
 
     def save(self, folder: Path) -> None:
         """Write ``NAME.json`` and, where the table has a picture, ``NAME.png``."""
-        folder.mkdir(parents=True, exist_ok=True)
         document = {"title": self.title, "rows": self.rows}
-        (folder / f"{self.name}.json").write_text(json.dumps(document, indent=2) + "\n", "utf-8")
+        write_text(folder / f"{self.name}.json", json.dumps(document, indent=2) + "\n")
         if self.picture is not None:
-            self.picture().savefig(folder / f"{self.name}.png")
+            with replacing(folder / f"{self.name}.png") as beside:
+                self.picture().savefig(beside)
 
 
 Part: TypeAlias = str | Rows

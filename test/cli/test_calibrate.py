@@ -1,7 +1,7 @@
 """``afm-scan calibrate --experiment`` records that experiment alone, in a bag of its name."""
 
 import os
-import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +9,14 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import processes
+from afm_scan_ros.cli import by_pipeline
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
+from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
 from helpers.in_process import default_plant, drive_through
 
@@ -109,12 +112,19 @@ def slowly(plan, first, count):
 
 excitation.excitation_block = slowly
 """
-"""For every process: the source takes longer for its blocks than any node may be silent."""
+"""For every process: the source takes longer for its blocks than any part may be silent."""
 
 
 @pytest.fixture
 def slow_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _at_start_of_each_process(SLOW_SOURCE, tmp_path, monkeypatch)
+    block = by_pipeline.excitation_block
+
+    def slowly(plan: Plan[Waveform], first: int, count: int) -> Trace:
+        time.sleep(2.0 if first else 0.0)
+        return block(plan, first, count)
+
+    monkeypatch.setattr(by_pipeline, "excitation_block", slowly)
 
 
 @pytest.fixture
@@ -126,7 +136,6 @@ def _at_start_of_each_process(code: str, tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "sitecustomize.py").write_text(code, "utf-8")
     path = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
-    monkeypatch.setattr(processes, "subprocess", subprocess)  # a forked process has started before
 
 
 @pytest.mark.evidence

@@ -11,7 +11,7 @@ from attrs import frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.files.images.channels import ImageChannel, Signal, chosen, image_of
-from afm_scan_ros.files.paths import path_of, writing
+from afm_scan_ros.files.paths import path_of
 
 HERE = "afm_scan_ros.files.images"
 INSTALL = "pip install 'afm_scan_ros[images]'"
@@ -121,8 +121,7 @@ def write_image(
             raise InputError(f"{path}: two channels would be in {target.name}: rename one")
         if target.exists():
             raise InputError(f"{target} exists already: give another file or remove it")
-    with writing(path):
-        module.write(targets, channels, stated, signals)
+    module.write(targets, channels, stated, signals)
     return targets
 
 

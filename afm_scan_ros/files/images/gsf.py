@@ -23,6 +23,7 @@ from afm_scan_ros.files.images.channels import (
     metres,
     paired,
 )
+from afm_scan_ros.files.paths import replacing
 
 RANGES = ("XReal", "YReal")
 FORBIDDEN = ("=", "\n", "\r", "\0")
@@ -54,7 +55,8 @@ def write(
         _refuse(path, channel, stated)
     for path, channel in zip(targets, channels, strict=True):
         rows = np.ascontiguousarray(channel.values[::-1], dtype=np.float32)
-        gsffile.write_gsf(path, rows, {**_fields(channel), **stated})
+        with replacing(path) as beside:
+            gsffile.write_gsf(beside, rows, {**_fields(channel), **stated})
 
 
 def _refuse(path: Path, channel: ImageChannel, stated: Mapping[str, str]) -> None:

@@ -32,6 +32,7 @@ from afm_scan_ros.files.images.channels import (
     metres,
     paired,
 )
+from afm_scan_ros.files.paths import replacing
 
 FIELD = re.compile(r"/(\d+)/data")
 TEXT = "s"
@@ -90,7 +91,8 @@ def write(
         container[f"/{number}/data/title"] = channel.title
         container.typecodes[f"/{number}/data/title"] = TEXT
         container[f"/{number}/meta"] = GwyContainer(dict(stated), dict.fromkeys(stated, TEXT))
-    container.tofile(str(path))
+    with replacing(path) as beside:
+        container.tofile(str(beside))
 
 
 def _data_field(channel: ImageChannel) -> GwyDataField:

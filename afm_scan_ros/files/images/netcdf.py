@@ -14,6 +14,7 @@ import numpy as np
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.images.channels import ImageChannel, Signal
+from afm_scan_ros.files.paths import replacing
 
 CONVENTIONS = "CF-1.11"
 SAMPLE = "sample"
@@ -31,7 +32,7 @@ def write(
     for name in names:
         if names.count(name) > 1 or name in ("x", "y"):
             raise InputError(f"{path}: two variables would be named '{name}': rename a channel")
-    with h5netcdf.File(path, "w") as file:
+    with replacing(path) as beside, h5netcdf.File(beside, "w") as file:
         file.attrs.update({"Conventions": CONVENTIONS, **stated})
         axes = _Axes(file)
         for channel in channels:

@@ -79,7 +79,6 @@ SOURCE, SCANNER, RECORDER = "excitation_generator", "piezoscanner_sim", "scan_re
 SILENT = f"{SCANNER} has been silent"
 _SOURCE_SILENT = f"{SOURCE} has been silent"
 _RECORDER_SILENT = f"{RECORDER} has been silent"
-_LATE = "the driver has not answered"
 _LOST = "the sensor is lost"
 FAULTS = (
     Fault("scanner's node killed (SIGKILL)", SILENT, number=signal.SIGKILL),
@@ -100,8 +99,8 @@ FAULTS = (
         _sleep,
         to=SOURCE,
     ),
-    Fault("driver answers half a second late", _LATE, driver="LateScanner"),
-    Fault("driver hangs, another thread can ramp", _LATE, driver="HungScanner"),
+    Fault("driver answers half a second late", "advance of the driver took", driver="LateScanner"),
+    Fault("driver hangs, another thread can ramp", "has not answered", driver="HungScanner"),
     Fault("forged drive of this scan", "another publisher", forged=True),
     Fault("scanner's node stopped (SIGSTOP)", SILENT, number=signal.SIGSTOP),
     Fault("source's node stopped (SIGSTOP)", _SOURCE_SILENT, number=signal.SIGSTOP, to=SOURCE),
@@ -209,12 +208,14 @@ class RaisingScanner(FaultyScanner):
 
 
 class LateScanner(FaultyScanner):
-    """Its converter stalls once for longer than it may."""
+    """Its converter stalls for longer than it may; the outputs can be ramped from its return on."""
 
     def fail(self, drive: Trace) -> Reading:
         """Answer half a second after the answer is due."""
         time.sleep(LATE)
-        return super().advance(drive)
+        Path(f"{self._noted_in}.fault").unlink()
+        note(self._noted_in)
+        return SimulatedScanner.advance(self, drive)
 
 
 class HungScanner(FaultyScanner):
@@ -225,7 +226,7 @@ class HungScanner(FaultyScanner):
     def fail(self, drive: Trace) -> Reading:
         """Wait for ever."""
         _sleep()
-        return super().advance(drive)
+        return SimulatedScanner.advance(self, drive)
 
 
 class RaisingWatchdog(FaultyScanner):
