@@ -247,8 +247,10 @@ def raise_failure(ended: Iterable[Ended], names: Iterable[str]) -> None:
     failed = [node for node in ended if node.status or STOPPED in node.said]
     if not failed:
         return
-    blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent)")
-    causes = [node for node in failed if not blame.search(node.said)] or failed[-1:]
+    blame = re.compile(rf"\b({'|'.join(names)}) (failed|has been silent|has finished no sample)")
+    named = {match[1] for node in failed if (match := blame.search(node.said))}
+    causes = [node for node in failed if not blame.search(node.said)]
+    causes = causes or [node for node in failed if node.name in named] or failed[-1:]
     message = "; ".join(node.said for node in causes)
     bad_input = all(node.status == 2 for node in causes)  # noqa: PLR2004 - its status
     error: Exception = InputError(message) if bad_input else ScanError(message)

@@ -123,9 +123,11 @@ class Peers:
         least = min((each.next_sample for each in going), default=0)
         if all(stands[each.node] <= timeout for each in going if each.next_sample == least):
             return None
+        silent = {e.node: now - max(began, e.heard) for e in reports if e.node != own.node}
+        longest = max(silent, key=lambda name: silent[name])
+        if silent[longest] > 0.5 * timeout:  # for which the source may have paused
+            return f"{longest} has been silent for {silent[longest]:.2g} s"
         culprit = _culprit(reports, info, [name for name in stands if stands[name] > pause])
-        if culprit.node != own.node and (silent := now - culprit.heard) > 0.5 * timeout:
-            return f"{culprit.node} has been silent for {silent:.2g} s"
         reason = f" ({culprit.reason})" if culprit.reason else ""
         return (
             f"{culprit.node} has finished no sample for {timeout:.3g} s: it stands at sample"

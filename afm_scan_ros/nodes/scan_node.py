@@ -223,7 +223,7 @@ class ScanNode(Node, ABC):
         """Return how long (s) samples may stand still: a block is output meanwhile."""
         if not self.settings["real_time"]:
             return float(self.settings["liveness_timeout_s"])
-        scale = max(1.0, self.settings["time_scale"])
+        scale = max(1.0, float(self.settings["time_scale"]))
         return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
 
     def _longest_pause(self) -> float:

@@ -22,9 +22,7 @@ def joined(*pairs: str, **parameters: object) -> Iterator[None]:
     """Join the domain with parameters, NAME:=VALUE or named, for all nodes of this process."""
     pairs += tuple(f"{name}:={json.dumps(value)}" for name, value in parameters.items())
     words = [word for pair in pairs for word in ("-p", pair)]
-    rclpy.init(
-        args=["test", "--ros-args", *words], signal_handler_options=SignalHandlerOptions.NO
-    )
+    rclpy.init(args=["test", "--ros-args", *words], signal_handler_options=SignalHandlerOptions.NO)
     try:
         yield
     finally:

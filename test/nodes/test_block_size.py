@@ -37,7 +37,6 @@ def test_round_rates_have_round_blocks(rate: float, size: int) -> None:
 @pytest.fixture
 def generate() -> Iterator[Generate]:
     """Return a function that makes a generator, at 20 kHz by default."""
-
     with ExitStack() as ended:
 
         def made(**given: object) -> TrajectoryGenerator:

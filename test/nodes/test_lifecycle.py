@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from afm_scan_ros.bag.reader import read_scan
@@ -164,7 +163,7 @@ def test_a_node_that_is_shut_down_ends_well(operator: Operator, start: Start) ->
 def test_a_transition_that_is_impossible_keeps_the_node_alive(
     operator: Operator, start: Start
 ) -> None:
-    """rclpy by itself raises, which would end it."""
+    """Rclpy by itself raises, which would end it."""
     node = start(NAME)
     operator.until(lambda: operator.reason() == "waits for scan_info")
     for label in ("configure", "activate", "cleanup", "nonsense"):
@@ -178,7 +177,9 @@ def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) 
     node = PiezoscannerSim()
     node.begin(INFO)
     block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
-    with pytest.raises(ScanError, match=r"^drive_voltage: a block came, .* to be configured$"):
+    with pytest.raises(
+        ScanError, match=r"^drive_voltage: a block came while this node waits to be configured$"
+    ):
         node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False), 1)
     node.destroy_node()
     assert (node.state, node.reason) == (FAILED, "deactivated at sample 0")

@@ -24,7 +24,6 @@ Start = Callable[..., Node]
 @pytest.fixture
 def start() -> Iterator[Start]:
     """Return a function that makes a node for which parameters were given."""
-
     with ExitStack() as ended:
 
         def make(*given: str) -> Node:

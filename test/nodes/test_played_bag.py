@@ -75,9 +75,7 @@ def test_a_pause_ends_no_reader(
 
 
 @pytest.mark.parametrize("announced", [True, False])
-def test_blocks_wait_for_the_announcement_of_their_scan(
-    player: Node, *, announced: bool
-) -> None:
+def test_blocks_wait_for_the_announcement_of_their_scan(player: Node, *, announced: bool) -> None:
     monitor = TrackingMonitor()
     info = info_of_scan(SPEC, "played", 10**18)
     topics = {topic: publisher(player, topic) for topic in (SCAN_INFO, DESIRED, ACHIEVED)}

@@ -149,9 +149,9 @@ def test_a_second_source_is_refused_at_once_by_name(begin: Begin) -> None:
     scan = begin(ScanRecorder, DESIRED)
     scan.until(lambda: scan.node.ready)
     said = "/scan_info announces scan 'other' during scan 'tested': stop all sources but one"
+    other = info_message(evolve(INFO, scan_id="other"))
     with one_more(SCAN_INFO, name="source") as send, pytest.raises(ScanError, match=f"^{said}$"):
-        send(info_message(evolve(INFO, scan_id="other")))
-        scan.until(lambda: False)
+        scan.until(lambda: send(other))
 
 
 def test_a_node_is_ready_once_it_has_heard_all_others(begin: Begin) -> None:

@@ -77,8 +77,8 @@ def test_a_node_without_a_scan_says_what_it_waits_for_and_why_it_ends(
     until(lambda: "ready: waits for scan_info" in written(node), operator)
     node.process.send_signal(signal.SIGINT)
     assert node.process.wait(PATIENCE) == 0
-    first, *_, last = written(node).splitlines()
-    assert "/piezoscanner_sim reads /drive_voltage, /node_state, /scan_info; it publishes" in first
+    said, last = written(node), written(node).splitlines()[-1]
+    assert "/piezoscanner_sim reads /drive_voltage, /node_state, /scan_info; it publishes" in said
     assert last.endswith("ends: interrupted by SIGINT")
 
 
@@ -93,7 +93,7 @@ def test_a_stop_ends_the_scan_smoothly_at_rest(
     assert statuses(started) == dict.fromkeys(started, 0)
     assert "done: stopped by request at sample" in started[SOURCE].last_words()
     told = written(started["scan_recorder"])
-    for news in ("reads /achieved_displacement, ", "ready: waits for", "running", "done"):
+    for news in ("reads /achieved_displacement, ", "ready", "running", "done"):
         assert news in told
     recording = read_scan(tmp_path / "bag")
     desired = recording.whole("desired_displacement")
@@ -165,7 +165,8 @@ def assert_blamed(victim: str, why: str, nodes: dict[str, NodeProcess]) -> None:
     others = {name: node for name, node in nodes.items() if name != victim}
     assert statuses(others) == dict.fromkeys(others, 3)
     words = {name: written(node) for name, node in others.items()}
-    assert all(victim in node.last_words() for node in others.values())
+    ends = [node.last_words() for node in others.values()]
+    assert [said for said in ends if victim not in said] == []
     assert any(f"{victim} {why}" in said for said in words.values())
     innocent = [f"{name} {why}" for name in others]
     assert not [each for each in innocent for said in words.values() if each in said]

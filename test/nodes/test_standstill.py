@@ -83,16 +83,19 @@ def state(name: str, reach: int) -> str:
     return {0: READY, TOTAL: DONE}.get(reach, RUNNING)
 
 
-def verdicts(chain: Chain, watcher: str) -> Iterator[str | None]:
-    """Yield what a node says, at each moment of a scan and while it stands still."""
+def verdicts(chain: Chain, watcher: str, silent: str = "") -> Iterator[str | None]:
+    """Yield what a node says, at each moment of a scan and while it stands still.
+
+    A ``silent`` victim says nothing after it has stopped.
+    """
     peers, now, advanced = Peers(), 100.0, 100.0
     peers.follow(NODES, watcher, INFO.scan_id, now)
     peers.begin(now)
     while not chain.done and now < 103.0:
-        before = chain.reach[watcher]
+        before = dict(chain.reach)
         chain.move()
         now += TICK
-        advanced = advanced if chain.reach[watcher] == before else now
+        advanced = advanced if chain.reach[watcher] == before[watcher] else now
         reports = {
             name: Report(
                 name,
@@ -105,8 +108,9 @@ def verdicts(chain: Chain, watcher: str) -> Iterator[str | None]:
             )
             for name, reach in chain.reach.items()
         }
-        for report in reports.values():
-            peers.hear(report)
+        for name, report in reports.items():
+            if name != silent or report.next_sample > before[name] or not before[name]:
+                peers.hear(report)
         yield peers.standstill(reports[watcher], INFO, now, LIMIT, PAUSE)
 
 
@@ -115,6 +119,13 @@ def test_whoever_watches_names_the_node_that_stopped(given_: Faults, watcher: st
     said = {each for each in verdicts(Chain(given_), watcher) if each}
     where = f"it stands at sample {given_.stops_at}"
     assert said == {f"{given_.victim} has finished no sample for {LIMIT:g} s: {where}"}
+
+
+@given(faults(*NODES), st.data())
+def test_one_that_says_nothing_is_named_for_that(given_: Faults, data: st.DataObject) -> None:
+    watcher = data.draw(st.sampled_from([name for name in NODES if name != given_.victim]))
+    said = {each for each in verdicts(Chain(given_), watcher, given_.victim) if each}
+    assert {each.partition(" for ")[0] for each in said} == {f"{given_.victim} has been silent"}
 
 
 @given(faults(""), st.sampled_from(NODES))

@@ -7,7 +7,6 @@ import sys
 import pytest
 from rclpy.node import Node
 
-from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import NODE_STATE
 from helpers.ros import PATIENCE, joined, until
 
@@ -64,7 +63,7 @@ def test_a_signal_while_the_interpreter_ends_changes_no_status(number: signal.Si
 
 
 def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> None:
-    heard: list[Message] = []
+    heard = []
     with joined():
         listener = Node("listener")
         topic = NODE_STATE

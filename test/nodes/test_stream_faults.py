@@ -64,6 +64,7 @@ class Source(Node):
 @pytest.fixture
 def recorded(tmp_path: Path) -> Iterator[Callable[..., ScanRecorder]]:
     """Return a function that lets a recorder follow a source until it ends."""
+
     def follow(messages: list[Message]) -> ScanRecorder:
         recorder, source = ScanRecorder(), Source(messages)
         executor = SingleThreadedExecutor()
