@@ -16,6 +16,7 @@ from afm_scan_ros.bag.writer import ScanWriter, write_record
 from afm_scan_ros.cli.export import export
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.imaging.lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
