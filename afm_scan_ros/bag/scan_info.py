@@ -1,6 +1,6 @@
 """What a bag states of its scan, and its blocks of samples, verified."""
 
-from math import isfinite
+from math import inf, isclose, isfinite
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,14 @@ from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Trace
 
 TYPE = f"{PACKAGE}/ScanInfo"
+INSTANTS = ("before_update", "after_update")
+"""When a sample is taken, seen from the converter's update."""
+SHORTEST, LONGEST = 1e-9, 2**63 * 1e-9
+"""Least sample period and longest scan, s: stamps count ns in 64 bits."""
+ROUNDING = 1e-9
+"""Share by which a period may differ from that of the lines: it is computed in another way."""
+LARGEST = 1e30
+"""No length and no voltage, in m and V: the universe is smaller."""
 
 
 @frozen
@@ -70,14 +78,17 @@ def info_fields(info: ScanInfo) -> dict[str, Any]:
 
 
 def info_from_message(message: Message) -> ScanInfo:
-    """Read a ``ScanInfo`` message; raises InputError where it contradicts itself."""
+    """Read a ``ScanInfo`` message.
+
+    Raises InputError where it contradicts itself, or states what cannot be.
+    """
     spec = None
     if message.pattern in PATTERNS:
         try:
             spec = ScanSpec(**{a.name: getattr(message, a.name) for a in scan_parameters()})
         except ValueError as error:
             raise InputError(f"scan_info: {error}") from error
-    return ScanInfo(
+    info = ScanInfo(
         scan_id=message.scan_id,
         start=stamp_of(message),
         pattern=message.pattern,
@@ -91,6 +102,38 @@ def info_from_message(message: Message) -> ScanInfo:
         window=int(message.window),
         nodes=tuple(message.nodes),
     )
+    if fault := _contradiction(info, described=message.lines > 0 and message.range_x > 0.0):
+        raise InputError(f"scan_info: {fault}")
+    return info
+
+
+def _contradiction(info: ScanInfo, *, described: bool) -> str:
+    """Say what cannot be; ``described`` is whether lines and a range are stated."""
+    period, total = info.sample_period, info.total_samples
+    if not SHORTEST <= period < inf:
+        return f"sample_period = {period:g}: give a time in s, {SHORTEST:g} at least"
+    if not 0 < total * period < LONGEST:
+        return f"total_samples = {total}: give 1 at least, and {LONGEST:g} s of them at most"
+    if info.sampling_instant not in INSTANTS or not isfinite(info.trigger_offset):
+        stated = f"sampling_instant = '{info.sampling_instant}', {info.trigger_offset:g} s"
+        return f"{stated}: give {' or '.join(INSTANTS)}, and the trigger's offset"
+    if info.spec is not None:
+        return _other_scan(info, info.spec)
+    known = f"pattern = '{info.pattern}' has lines: give one of {', '.join(PATTERNS)}"
+    return known if described else ""
+
+
+def _other_scan(info: ScanInfo, spec: ScanSpec) -> str:
+    """Say where the samples are not those of the scan that is described."""
+    period, total = info.sample_period, info.total_samples
+    if not isclose(period, spec.sample_period, rel_tol=ROUNDING):
+        made = f"{spec.line_rate:g} lines/s of {spec.samples_per_line} samples"
+        return f"sample_period = {period:g} s, but {made} make {spec.sample_period:g} s"
+    if total != (expected := total_samples(spec)):
+        return (
+            f"total_samples = {total}, but its lines and what is before and after make {expected}"
+        )
+    return ""
 
 
 def encode_info(info: ScanInfo) -> bytes:
@@ -270,6 +313,11 @@ class Continuity:
                 f"sample {trace.first_sample} comes again, after sample {expected - 1}:"
                 " see that one node alone publishes this topic"
             )
+        if self.info.total_samples and expected + trace.x.size > self.info.total_samples:
+            return (
+                f"samples {expected} to {expected + trace.x.size - 1} are more than the"
+                f" {self.info.total_samples} that scan_info announces: record one scan a bag"
+            )
         return ""
 
 
@@ -278,9 +326,9 @@ def _bad_sample(trace: Trace) -> str:
         return f"at sample {trace.first_sample} x has {trace.x.size} samples, y {trace.y.size}"
     for axis in AXES:
         samples = trace.axis(axis)
-        if isfinite(samples.dot(samples)):  # finite if each of them is
+        if samples.dot(samples) < LARGEST**2:  # each of them is below
             continue
-        bad = np.flatnonzero(~np.isfinite(samples))
+        bad = np.flatnonzero(~(np.abs(samples) < LARGEST))
         if bad.size:
             value = samples[bad[0]]
             return f"{axis} is {value} at sample {trace.first_sample + bad[0]}"

@@ -1,6 +1,6 @@
 """``afm-scan export``: images and signals of a bag for other programs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -9,7 +9,7 @@ import numpy as np
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.scan_channels import STREAMS, scan_channels
 from afm_scan_ros.cli.options import NEW_FILE, RECORD, refuse_existing, topic_option, warn, working
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.files import PACKAGE, version
@@ -71,6 +71,8 @@ def export(bag: Path, target: Path, pixels: int | None, topics: Mapping[str, str
         files, channels, signals = _written(recording, target, pixels)
     warn(recording.warnings)
     _say(files, channels, signals)
+    if shortcomings := list(_shortcomings(recording, channels, signals)):
+        raise ScanError(f"{recording.path}: the scan is incomplete: {'; '.join(shortcomings)}")
 
 
 def _written(
@@ -100,11 +102,20 @@ def _has_lines(recording: ScanRecording) -> bool:
 
 
 def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:
-    spec = scan_spec(recording)
-    found = scan_channels(recording, spec, pixels)
-    if found and (whole := len(found[-1].values)) < spec.lines:
-        warn([f"{recording.path}: {whole} of {spec.lines} lines of the scan are whole"])
-    return found
+    return scan_channels(recording, scan_spec(recording), pixels)
+
+
+def _shortcomings(
+    recording: ScanRecording, channels: Sequence[ImageChannel], signals: Sequence[Signal]
+) -> Iterator[str]:
+    """Say how much is missing of what was written."""
+    spec = recording.info.spec
+    if channels and spec is not None and (whole := len(channels[-1].values)) < spec.lines:
+        yield f"{whole} of {spec.lines} lines of the scan are whole"
+    if signals:
+        end = round(signals[0].values[-1] / recording.info.sample_period) + 1
+        if missing := recording.missing(end):
+            yield f"the last {missing} samples are missing"
 
 
 def _signals(recording: ScanRecording, names: Sequence[str]) -> tuple[Signal, ...]:
@@ -114,8 +125,8 @@ def _signals(recording: ScanRecording, names: Sequence[str]) -> tuple[Signal, ..
         raise InputError(f"{recording.path}: holds no samples of a scanner: give another bag")
     traces = recording.together(*there)
     first, count = traces[0].first_sample, len(traces[0].x)
-    if missing := recording.missing(first + count):
-        warn([f"{recording.path}: the last {missing} samples are missing"])
+    if not count:
+        raise InputError(f"{recording.path}: holds no samples that all its streams have")
     time: Array = recording.info.sample_period * np.arange(first, first + count, dtype=float)
     found = [Signal("time", "s", time)]
     for name, trace in zip(there, traces, strict=True):

@@ -7,12 +7,12 @@ from collections.abc import Collection
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.peers import READY
+from afm_scan_ros.nodes.run import join
 from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, TRUE
 
 
@@ -21,7 +21,7 @@ def found_scanner(names: Collection[str], longest: float) -> tuple[str, bool]:
 
     All of its topics are there then. Raises InputError where there is none within ``longest`` s.
     """
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    join([])
     try:
         return _found(Node("scanner_search"), names, longest)
     finally:

@@ -1,14 +1,16 @@
 """``afm-scan analyze``, ``diagnose`` and ``adapt``: what recorded scans show."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import click
+import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.api import diagnosis as api
 from afm_scan_ros.api.model import load_model
+from afm_scan_ros.api.record import Record
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import (
     FILE,
@@ -29,6 +31,7 @@ from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.adaptation import Adaptation
 from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import model_file
 from afm_scan_ros.files.paths import write_text
@@ -65,7 +68,7 @@ def analyze(
         _show_comparison(compared, json_file)
         return
     analysis = analyse(recording)
-    warn(recording.warnings)
+    warn(analysis.warnings)
     show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
     if json_file is not None:
         write_text(json_file, json.dumps(plain(analysis), indent=2) + "\n")
@@ -194,6 +197,8 @@ def diagnose(
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
+    for record in (*records, *well):
+        warn(_doubts(record))
     if depolarised:
         records = [evolve(record, start="depolarised") for record in records]
     with working("diagnosing") as progress:
@@ -202,3 +207,13 @@ def diagnose(
         found.save(out)
     show(found.summary)
     say(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
+
+
+def _doubts(record: Record) -> Iterator[str]:
+    """Yield a sentence for each axis whose sensor shows nothing, or what no scanner does."""
+    driven = np.ptp(record.drive, axis=0)
+    coupled = len(driven) != len(record.axes)
+    for number, (axis, moved) in enumerate(zip(record.axes, record.displacement.T, strict=True)):
+        extent = driven.max() if coupled else driven[number]
+        if doubt := sensor_doubt(axis, extent, moved.min(), moved.max()):
+            yield f"{record.name}: {doubt}"

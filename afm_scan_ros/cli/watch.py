@@ -7,11 +7,11 @@ import rclpy
 from attrs import define, field
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.cli.progress import ScanProgress, showing
 from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.run import join
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
 
 MOMENT = 0.1
@@ -52,7 +52,7 @@ class ScanWatch:
 @contextmanager
 def watching(title: str) -> Iterator[Callable[[], None]]:
     """Show a scan while it runs; yield a function that listens for a moment."""
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    join([])
     try:
         with showing(title) as shown:
             node, executor = Node("afm_scan"), SingleThreadedExecutor()

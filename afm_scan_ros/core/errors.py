@@ -4,9 +4,12 @@
 class InputError(ValueError):
     """Something given to the package is wrong: file, argument or data.
 
-    The message is one line that names the file or argument, the place in it and the fix.
-    A command that meets it exits with status 2.
+    The message is one line that names the file or argument, the place in it and the fix; line ends
+    that a library or a file put into it become blanks. A command that meets it exits with status 2.
     """
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(" ".join(str(message).splitlines()))
 
 
 class ScanError(RuntimeError):

@@ -12,8 +12,8 @@ from afm_scan_ros.core.errors import InputError
 
 PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
 PREPARATIONS = ("depolarise", "saturate", "none")
-SMALLEST_RANGE = 1e-9
-PLAUSIBLE = (ge(SMALLEST_RANGE), le(1e-3))
+SMALLEST_RANGE, LARGEST_RANGE = 1e-9, 1e-3
+PLAUSIBLE = (ge(SMALLEST_RANGE), le(LARGEST_RANGE))
 """Ranges, m, that a piezoscanner can have: what lies outside was meant in another unit."""
 MOST_PER_LINE = 10**7
 """Samples in a line; one is held in memory whole."""

@@ -28,7 +28,7 @@ LARGEST = 2**20
 """Bytes of a file, a hundred times those of any that people write."""
 DEEPEST = 20
 """Values within each other."""
-MOST_VALUES = 10**5
+MOST_VALUES = 50_000
 """Values of a file, keys among them; each takes a kilobyte and 40 µs until it is read."""
 
 _BOOL = re.compile(f"({'|'.join(sorted(_TRUE | _FALSE))})$")

@@ -5,7 +5,6 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
@@ -49,8 +48,8 @@ def run_node(name: str) -> int:
     kind.warm_up()
     caught = _catch_signals()
     try:
-        warnings = _join()
-        return _run(_made(kind, warnings), caught)
+        join()
+        return _run(_made(kind), caught)
     except InputError as error:
         return _ended(kind.NAME, str(error), 2)
     finally:
@@ -58,16 +57,15 @@ def run_node(name: str) -> int:
         _ignore_signals()
 
 
-def _made(kind: type[ScanNode], warnings: Iterable[str]) -> ScanNode:
+def _made(kind: type[ScanNode]) -> ScanNode:
     """Return a node; raises InputError, said in ROS too, where it cannot be made."""
     try:
         node = kind()
     except InputError as error:
         _report_refusal(kind.NAME, error)
         raise
-    idle = (f"parameter {each} does nothing: {node.NAME} has none" for each in undeclared(node))
-    for warning in (*warnings, *idle):
-        node.get_logger().warning(warning)
+    for name in undeclared(node):
+        node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
     if node.settings["real_time"]:
         _take_priority(node)
     return node
@@ -99,14 +97,17 @@ def _report_refusal(name: str, error: InputError) -> None:
     node.destroy_node()
 
 
-def _join() -> list[str]:
-    """Join ROS; return what is to be logged of its middleware."""
-    warnings = middleware.prepare()
+def join(arguments: list[str] | None = None) -> None:
+    """Join ROS with the arguments of a command line, by default this process's.
+
+    What is to be known of the middleware goes to stderr before, since it may be why joining hangs.
+    """
+    for warning in middleware.prepare():
+        sys.stderr.write(f"{warning}\n")
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # for arguments that do not parse
         raise InputError(str(error)) from error
-    return warnings
 
 
 def _run(node: ScanNode, caught: list[str]) -> int:

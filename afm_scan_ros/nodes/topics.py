@@ -33,6 +33,16 @@ _EVERYTHING = QoSProfile(
 )
 
 
+# One message a line, of which the last ones are kept for a reader that is behind: viewers plot
+# them, and one that hangs cannot make the monitor wait.
+_LINES = QoSProfile(
+    depth=1000,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
+
 # Viewers alone read it: none of them can make a node wait.
 _FOR_VIEWERS = QoSProfile(
     depth=200,
@@ -60,8 +70,8 @@ DESIRED = _blocks("desired_displacement", DisplacementBlock)
 DRIVE = _blocks("drive_voltage", VoltageBlock)
 ACHIEVED = _blocks("achieved_displacement", DisplacementBlock)
 TRUE = _blocks("true_displacement", DisplacementBlock)
-TRACKING_ERROR = _blocks("tracking_error", TrackingError)
-MODEL_RESIDUAL = _blocks("model_residual", TrackingError)
+TRACKING_ERROR = NodeTopic("tracking_error", TrackingError, _LINES, _EVERYTHING)
+MODEL_RESIDUAL = NodeTopic("model_residual", TrackingError, _LINES, _EVERYTHING)
 MONITOR = NodeTopic("monitor", MonitorSample, _FOR_VIEWERS, _FOR_VIEWERS)
 TRACE_IMAGE = NodeTopic("scan_image/trace", Image, _latched(1), _latched(1))
 RETRACE_IMAGE = NodeTopic("scan_image/retrace", Image, _latched(1), _latched(1))

@@ -1,5 +1,9 @@
 """Desired against achieved displacement: all figures of a recorded scan or other record."""
 
+from collections.abc import Iterator
+from math import isclose
+from typing import TypeAlias
+
 import numpy as np
 from attrs import field, frozen
 
@@ -8,8 +12,11 @@ from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import METRES, Tracking, TrackingMeter
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.sensor_check import sensor_doubt
+from afm_scan_ros.core.types import AXES, Array, Trace
 
+OTHER_RANGE = 0.05
+"""Share by which the desired range may differ from what is stated: samples miss the very turns."""
 VOLTS = {"unit": "v"}
 
 
@@ -66,7 +73,10 @@ def analyse(recording: ScanRecording) -> Analysis:
     meters = {"achieved_displacement": TrackingMeter(spec, "measured")}
     if "true_displacement" in recording.topics:
         meters["true_displacement"] = TrackingMeter(spec, "true")
+    ends = []
     for desired, *achieved in recording.blocks("desired_displacement", *meters):
+        if desired.x.size:
+            ends.append(_ends(achieved[0]))
         for meter, trace in zip(meters.values(), achieved, strict=True):
             meter.add(desired, trace)
     measured = meters["achieved_displacement"].tracking()
@@ -81,16 +91,41 @@ def analyse(recording: ScanRecording) -> Analysis:
         measured=measured,
         true=true.tracking() if true else None,
         drive=_drive_range(recording),
-        warnings=recording.warnings,
+        warnings=(*recording.warnings, *_doubts(recording, measured, ends)),
         shortcomings=() if measured.samples == total else (incomplete,),
     )
+
+
+Ends: TypeAlias = list[tuple[float, float]]
+"""Lowest and highest value of each axis."""
+
+
+def _ends(trace: Trace) -> Ends:
+    return [(float(v.min()), float(v.max())) for v in (trace.x, trace.y)]
+
+
+def _doubts(recording: ScanRecording, measured: Tracking, ends: list[Ends]) -> Iterator[str]:
+    """Say what is dubious in the sensors, and where the samples are not those of scan_info."""
+    spec = scan_spec(recording)
+    planned = {"x": spec.range_x, "y": spec.range_y}
+    for number, axis in enumerate(AXES if ends else ()):
+        moved = getattr(measured, axis).peak_to_peak
+        lowest, highest = np.array([each[number] for each in ends]).T
+        doubt = sensor_doubt(axis, moved, lowest.min(), highest.max())
+        if doubt:
+            yield f"{recording.path}: {doubt}"
+        if measured.lines == spec.lines and not isclose(moved, planned[axis], rel_tol=OTHER_RANGE):
+            yield (
+                f"{recording.path}: scan_info states a range of {planned[axis]:g} m in {axis}, and"
+                f" the desired displacement spans {moved:g} m"
+            )
 
 
 def _drive_range(recording: ScanRecording) -> DriveRange | None:
     if "drive_voltage" not in recording.topics:
         return None
     blocks = recording.blocks("drive_voltage")
-    ends = [[(v.min(), v.max()) for v in (drive.x, drive.y)] for (drive,) in blocks]
+    ends = [_ends(drive) for (drive,) in blocks if drive.x.size]
     if not ends:
         return None
     lowest, highest = np.min(ends, axis=0)[:, 0].tolist(), np.max(ends, axis=0)[:, 1].tolist()

@@ -16,6 +16,7 @@ from afm_scan_ros.bag.writer import ScanWriter, write_record
 from afm_scan_ros.cli.export import export
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.imaging.lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
@@ -65,6 +66,14 @@ def run(bag: Path, target: Path, *options: str) -> str:
     result = CliRunner().invoke(export, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.output
+
+
+def incomplete(bag: Path, target: Path) -> str:
+    """Export what there is of a scan, which ends as 'afm-scan analyze' of it does."""
+    with pytest.raises(ScanError, match=f"^{bag}: the scan is incomplete: ") as end:
+        CliRunner().invoke(export, [str(bag), "--to", str(target)], catch_exceptions=False)
+    assert target.exists()
+    return str(end.value)
 
 
 def test_errors_and_positions_at_the_desired_ones(bag: Path, tmp_path: Path) -> None:
@@ -191,9 +200,10 @@ def test_a_stopped_scan_has_the_lines_that_are_whole(tmp_path: Path) -> None:
     with ScanWriter(tmp_path / "bag", info) as writer:
         for name, trace in streams(samples).items():
             writer.add(name, trace)
-    assert "8 of 9 lines of the scan are whole" in run(tmp_path / "bag", tmp_path / "a.gwy")
+    said = incomplete(tmp_path / "bag", tmp_path / "a.gwy")
+    assert "8 of 9 lines of the scan are whole" in said
     assert read_image(tmp_path / "a.gwy", "Error x").range_y == pytest.approx(8e-6)
-    said = run(tmp_path / "bag", tmp_path / "a.csv")
+    said = incomplete(tmp_path / "bag", tmp_path / "a.csv")
     assert f"the last {total_samples(SPEC) - samples} samples are missing" in said
 
 

@@ -15,6 +15,7 @@ FAULTS = (
     "damaged_bags",
     "mutated_files",
     "stated_sizes",
+    "fuzzed_readers",
     "foreign_nodes",
 )
 """Modules of ``injection``, whose ``inject(announce)`` yields a row for each of its faults."""

@@ -5,6 +5,7 @@ import time
 import pytest
 
 from afm_scan_bench.faults.injection import damaged_bags as faults_damaged_bags
+from afm_scan_bench.faults.injection import fuzzed_readers as faults_fuzzed_readers
 from afm_scan_bench.faults.injection import mutated_files as faults_mutated_files
 from afm_scan_bench.faults.injection import outcome as faults_outcome
 from afm_scan_bench.faults.injection import stated_sizes as faults_stated_sizes
@@ -22,6 +23,11 @@ def test_nothing_is_lost_by_damage_to_bags() -> None:
 def test_nothing_is_lost_by_mistakes_in_files() -> None:
     rows = list(faults_mutated_files.inject(lambda _: None, trials=90))
     assert [row["losses"] for row in rows] == [0] * 5, rows
+
+
+def test_every_reader_reads_or_refuses_whatever_is_damaged() -> None:
+    rows = list(faults_fuzzed_readers.inject(lambda _: None, trials=340))
+    assert [row["losses"] for row in rows] == [0] * len(faults_fuzzed_readers.READERS), rows
 
 
 def refused(message: str) -> None:

@@ -4,7 +4,7 @@ import io
 import struct
 import tracemalloc
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +13,8 @@ import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
+from PIL import Image
+from scipy.io import savemat
 
 from afm_scan_bench.faults.damage import Rng
 from afm_scan_bench.faults.faults import Announce, row
@@ -20,16 +22,20 @@ from afm_scan_bench.faults.injection.outcome import REFUSED, LossError, Tally
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.arrays import Archive
+from afm_scan_ros.files.drive_files import read_drive
+from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant, load_scan
-from afm_scan_ros.files.tables import read_array
+from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.files.tables import read_archive, read_array, read_matlab
+from afm_scan_ros.files.unfolding import FREE
 from afm_scan_ros.report.table import Row
 
 TRIALS = 10
 """Of each kind, with sizes drawn anew."""
-MOST = 100e6
+MOST = 300e6
 """Bytes that reading such a file may take."""
-_UNFOLDED = 2**28
+_UNFOLDED = FREE + 2**20
 
 
 def inject(announce: Announce, trials: int = TRIALS) -> Iterator[Row]:
@@ -76,10 +82,50 @@ def _header(rng: Rng) -> bytes:
     return stream.getvalue()
 
 
-def _archive(rng: Rng, *, packed: bool) -> bytes:
+def _archive(rng: Rng, *, packed: bool, names: Sequence[str] = ("a",)) -> bytes:
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a.npy", bytes(_UNFOLDED) if packed else _header(rng))
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name in names:
+            archive.writestr(f"{name}.npy", bytes(_UNFOLDED) if packed else _header(rng))
+    return stream.getvalue()
+
+
+def _directory(rng: Rng) -> bytes:
+    """Return an archive of so many arrays that their names alone take memory."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for number in range(30_000):
+            archive.writestr(f"{number}{rng.integers(10)}.npy", b"")
+    return stream.getvalue()
+
+
+def _matlab(_: Rng) -> bytes:
+    """Return a MATLAB file of version 5 with a compressed matrix of zeros."""
+    stream = io.BytesIO()
+    savemat(stream, {"u": np.zeros((_UNFOLDED // 8, 1))}, do_compression=True)
+    return stream.getvalue()
+
+
+def _values(rng: Rng) -> bytes:
+    return b"a: [" + b"%d," % rng.integers(10) * 400_000 + b"1]"
+
+
+def _nothing(rng: Rng) -> bytes:
+    """Return an MCAP file of records that say nothing."""
+    return MCAP0_MAGIC + struct.pack("<BQ", int(rng.integers(0x80, 256)), 0) * 10**6 + MCAP0_MAGIC
+
+
+def _chunks(rng: Rng) -> bytes:
+    """Return an MCAP file of chunks that each unpack to as much as one may."""
+    body = _chunk(rng, packed=True)[len(MCAP0_MAGIC) : -len(MCAP0_MAGIC)]
+    stated = bytearray(body)
+    struct.pack_into("<Q", stated, 25, 2**27)
+    return MCAP0_MAGIC + bytes(stated) * 16 + MCAP0_MAGIC
+
+
+def _picture(_: Rng) -> bytes:
+    stream = io.BytesIO()
+    Image.new("1", (20_000, 20_000)).save(stream, "PNG")
     return stream.getvalue()
 
 
@@ -113,6 +159,18 @@ HOSTILE: Mapping[str, tuple[Callable[[Rng], bytes], Callable[[Path], object]]] =
     "table.npy": (_header, read_array),
     "stated.npz": (partial(_archive, packed=False), lambda path: Archive(path).matrix("a")),
     "packed.npz": (partial(_archive, packed=True), lambda path: Archive(path).matrix("a")),
+    "learned.npz": (
+        partial(_archive, packed=True, names=("x", "y", "made_for")),
+        load_learned,
+    ),
+    "drive.npz": (partial(_archive, packed=True, names=("drive_v",)), read_drive),
+    "record.npz": (partial(_archive, packed=True), read_archive),
+    "directory.npz": (_directory, read_archive),
+    "record.mat": (_matlab, read_matlab),
+    "values.yaml": (_values, load_scan),
+    "picture.png": (_picture, partial(load_sample, width=1e-6, white=1e-7)),
+    "nothing.mcap": (_nothing, read_scan),
+    "chunks.mcap": (_chunks, read_scan),
     "stated.mcap": (partial(_chunk, packed=False), read_scan),
     "packed.mcap": (partial(_chunk, packed=True), read_scan),
     "record.mcap": (_record, read_scan),
