@@ -95,7 +95,7 @@ def test_an_edited_model_is_read_with_a_warning(
     assert not caplog.messages
     content = path.read_text()
     place = content.index("gains: [") + len("gains: [")
-    path.write_text(f"{content[:place]}0.001{content[content.index(',', place):]}")
+    path.write_text(f"{content[:place]}0.001{content[content.index(',', place) :]}")
     afm.load_model(path)
     assert f"{path} was edited after it was written" in caplog.text
 
