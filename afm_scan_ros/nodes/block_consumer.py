@@ -155,7 +155,15 @@ class BlockConsumer(ScanNode):
         self.advance()
 
     def refuses(self) -> bool:
-        """Return whether no block of the scan can be there yet: what came is another's."""
+        """Return whether no block of the scan can be there yet: what came is another's.
+
+        The source waits for the nodes of its scan alone.
+        """
+        return self.is_unready and (self.info is None or self.get_name() in self.info.nodes)
+
+    @property
+    def is_unready(self) -> bool:
+        """Whether the node is still to say that it is ready."""
         return self.state == READY and not self.ready
 
     def follow(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> Trace:
@@ -302,8 +310,8 @@ class ManagedConsumer(LifecycleNodeMixin, BlockConsumer):
         return self.is_active and super().step()
 
     def refuses(self) -> bool:
-        """Return whether a block is another's, as one is that comes to a node not active."""
-        return not self.is_active or super().refuses()
+        """Return whether a block must not move anything, whoever sent it."""
+        return not self.is_active or self.is_unready
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002 - rclpy's
         """Open the hardware."""

@@ -8,6 +8,7 @@ import pytest
 
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.typestore import decode
 from afm_scan_ros.cli import ways
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.cli.options import CONFIG
@@ -23,8 +24,6 @@ SPEC = """\
   ros__parameters: {line_rate_hz: 100.0, lines: 40, samples_per_line: 500, turnaround: 0.2,
     block_size: 700, scan_id: one}
 """
-AFTER_STAMP = 12
-"""Bytes of a message: four of its encoding, and eight of the stamp that all topics begin with."""
 EQUAL = {
     *("/desired_displacement", "/drive_voltage", "/achieved_displacement", "/true_displacement"),
     *("/tracking_error", "/model_residual"),
@@ -32,16 +31,18 @@ EQUAL = {
 """Topics; viewers need not get all of /monitor, and no node takes part in the pipeline's scan."""
 
 
-def sent(bag: Path) -> dict[str, list[bytes]]:
-    """Return what a bag holds of each topic, but for when the scan began: a header's stamp.
-
-    DDS pads a message to four bytes.
-    """
-    found: dict[str, list[bytes]] = {}
+def sent(bag: Path) -> dict[str, list[object]]:
+    """Return the numbers of each topic of a bag, however its samples are cut into blocks."""
+    found: dict[str, list[object]] = {}
     for file in sorted(bag.glob("*.mcap")):
         for message in messages(file):
-            padded = message.cdr.ljust(-4 * (-len(message.cdr) // 4), b"\0")
-            found.setdefault(message.topic, []).append(padded[AFTER_STAMP:])
+            fields = decode(message.type_name, message.cdr)
+            numbers = found.setdefault(message.topic, [])
+            if hasattr(fields, "last"):
+                numbers += zip(fields.x.tolist(), fields.y.tolist(), strict=True)
+            elif hasattr(fields, "line"):
+                rms, largest = (fields.rms_x, fields.rms_y), (fields.max_x, fields.max_y)
+                numbers.append((fields.line, *rms, *largest))
     return found
 
 
