@@ -9,12 +9,14 @@ import pytest
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.nodes.messages import Message, state_message
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import live
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
 from afm_scan_ros.nodes.topics import NODE_STATE
 from helpers.ros import joined
 
-INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source", "other"))
+NODES = ("source", "other", "one that is never heard")
+INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=NODES)
 RATE = 3000
 """States that arrive in a second."""
 EVERY = 300
@@ -75,6 +77,7 @@ def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Busy]:
         made = Busy()
         made.hear_others()
         made.begin(INFO)
+        made.go(RUNNING)
         monkeypatch.setattr(made, "hear_others", lambda: None)
         yield made
         made.destroy_node()
