@@ -4,6 +4,8 @@ import time
 
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.faults.injection import damaged_bags as faults_damaged_bags
 from afm_scan_bench.faults.injection import fuzzed_readers as faults_fuzzed_readers
 from afm_scan_bench.faults.injection import mutated_files as faults_mutated_files
