@@ -14,8 +14,10 @@ HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQ")  # both times of a chunk, and the bytes that it unpacks to
 _FEW = 10**5
 _LEAST = 50
-"""Bytes of a record on the average, a chunk with a single short message and its indices at least:
-so many records of each size that are more than a few are no recording."""
+"""Records beside messages that any file may have, and bytes of each in a larger one at least.
+
+A chunk and its indices have more.
+"""
 
 
 def refuse_sizes(path: Path) -> None:
@@ -30,12 +32,12 @@ def refuse_sizes(path: Path) -> None:
                     *_, stated = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
                     unpacked += stated if stated <= FREE else 0  # it is not unpacked
                     refuse_unfolding(unpacked, size)
-                count += 1
+                count += kind != Opcode.MESSAGE
                 place += HEAD.size + length
                 stream.seek(min(place, size))
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
     if count > _FEW + size / _LEAST:
         raise InputError(
-            f"{path}: over {count} records in {size} bytes, which say nothing: record it again"
+            f"{path}: over {count} records beside messages in {size} bytes: record it again"
         )
