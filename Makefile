@@ -15,6 +15,7 @@ EXCHANGES := --ignore=test/drivers --ignore=test/nodes --ignore=test/cli/test_ca
 # What starts nodes, and all that a command does otherwise where there is ROS. Each worker has a
 # domain of its own.
 ON_ROS := test/nodes test/drivers test/cli test/test_launch.py
+FAULTS_ON_ROS := $(wildcard benchmarks/test/bench/test_*fault*.py benchmarks/test/bench/test_pipes.py benchmarks/test/bench/test_real_time.py)
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 # Tests start many processes, each of which would compile the package anew.
@@ -51,6 +52,7 @@ test-nodes: $(ROS)/ready
 test-ros: $(ROS)/ready
 	$(call pytest_on_ros,-m "not evidence" $(ON_ROS))
 	$(call pytest_on_ros,-m evidence test/nodes)
+	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,$(FAULTS_ON_ROS))
 	@if $(ROS)/run python -c "import ctypes; ctypes.CDLL('librmw_cyclonedds_cpp.so')" 2>/dev/null; then \
 	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-m "not evidence" test/nodes); \
 	else echo "make test-ros: this ROS has no rmw_cyclonedds_cpp: the nodes were tested on Fast DDS alone"; fi

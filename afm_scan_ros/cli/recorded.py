@@ -197,14 +197,14 @@ def diagnose(
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
-    for record in (*records, *well):
-        warn(_doubts(record))
     if depolarised:
         records = [evolve(record, start="depolarised") for record in records]
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, well, progress, longest)
         progress("describing the residual")
         found.save(out)
+    for record in (*records, *well):
+        warn(_doubts(record))
     show(found.summary)
     say(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
 

@@ -29,6 +29,11 @@ def cell(text: str, style: str = "") -> Text:
     return Text(visible(text), style)
 
 
+def _heading(text: str) -> Text:
+    """Return the text above a column, which may have several lines."""
+    return Text("\n".join(map(visible, text.split("\n"))))
+
+
 @frozen
 class Rows:
     """Rows of text below their headings, if they have any; the first column names the rows."""
@@ -42,7 +47,7 @@ class Rows:
         title = cell(self.title, "table.title") if self.title else None
         shown = RichTable(box=None, pad_edge=False, title=title, title_justify="left")
         for number, heading in enumerate(self.headings):
-            shown.add_column(cell(heading), justify="right" if number else "left")
+            shown.add_column(_heading(heading), justify="right" if number else "left")
         shown.show_header = bool(self.headings)
         for row in self.rows:
             shown.add_row(*map(cell, row))
@@ -78,7 +83,7 @@ class Table:
             words = " ".join([heading, *entries]).split()
             width = min(WIDEST_WORD, max(len(word) for word in words))
             side: Literal["left", "right"] = "right" if form else "left"
-            shown.add_column(cell(heading), justify=side, min_width=width, overflow="fold")
+            shown.add_column(_heading(heading), justify=side, min_width=width, overflow="fold")
         for row in text.rows:
             shown.add_row(*map(cell, row))
         console = Console()

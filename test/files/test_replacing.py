@@ -47,7 +47,8 @@ def test_a_model_outlives_whoever_saves_it(tmp_path: Path) -> None:
     for trial in range(6):
         words = [sys.executable, "-c", SAVE_FOR_EVER, path, CONFIG / "model.yaml", other]
         with subprocess.Popen(words, stdout=subprocess.PIPE) as saving:
-            assert saving.stdout and saving.stdout.readline()
+            assert saving.stdout
+            assert saving.stdout.readline()
             while not path.exists():
                 time.sleep(0.01)
             time.sleep(0.05 + 0.037 * trial)
@@ -100,14 +101,18 @@ def test_an_edited_model_is_read_with_a_warning(
     assert f"{path} was edited after it was written" in caplog.text
 
 
+def _fail_within(beside: Path) -> None:
+    beside.write_text("half")
+    raise RuntimeError
+
+
 def test_a_failure_leaves_the_old_file_and_nothing_beside(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     write_text(path, "old")
     with pytest.raises(RuntimeError), replacing(path) as beside:
-        beside.write_text("half")
-        raise RuntimeError
+        _fail_within(beside)
     assert path.read_text() == "old"
-    assert os.listdir(tmp_path) == ["a.txt"]
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_link_and_a_device_stay_what_they_are(tmp_path: Path) -> None:

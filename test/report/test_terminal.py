@@ -48,7 +48,7 @@ def harmless(shown: str, lines: int) -> None:
 
 def test_no_cell_title_or_line_is_markup(capsys: pytest.CaptureFixture[str]) -> None:
     Rows((), [("a", HOSTILE)], HOSTILE).show()
-    harmless(capsys.readouterr().out.replace(" ", ""), 3)
+    harmless(capsys.readouterr().out.replace(" ", ""), 2)
     Table("t", HOSTILE, {"a": (HOSTILE, "")}, [{"a": HOSTILE}]).show()
     assert capsys.readouterr().out.count("[/b]") == 3
     say(HOSTILE)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.faults.injection import cut
 from afm_scan_bench.faults.injection.drive import DriveOutcome, endanger
 from afm_scan_bench.faults.injection.faulty_scanner import FAULTS, HANG, Fault

@@ -8,6 +8,8 @@ from unittest import mock
 
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.faults.injection import order
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.disk import fill

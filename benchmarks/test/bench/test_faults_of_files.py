@@ -4,6 +4,8 @@ import time
 
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.faults.injection import damaged_bags as faults_damaged_bags
 from afm_scan_bench.faults.injection import fuzzed_readers as faults_fuzzed_readers
 from afm_scan_bench.faults.injection import mutated_files as faults_mutated_files
@@ -11,7 +13,7 @@ from afm_scan_bench.faults.injection import outcome as faults_outcome
 from afm_scan_bench.faults.injection import stated_sizes as faults_stated_sizes
 from afm_scan_bench.faults.injection.outcome import Tally
 from afm_scan_bench.faults.injection.readings import LossError, refuse_other
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 
 
 def test_nothing_is_lost_by_damage_to_bags() -> None:
@@ -34,12 +36,16 @@ def refused(message: str) -> None:
     raise InputError(message)
 
 
+def failed(message: str) -> None:
+    raise ScanError(message)
+
+
 @pytest.mark.parametrize(
     ("trial", "losses"),
     [
         (lambda: refused("here: a line"), 0),
         (lambda: refused("a line without its place"), 1),
-        (lambda: refused("here:\ntwo lines"), 1),
+        (lambda: failed("here:\ntwo lines"), 1),
         (lambda: {}["key"], 1),
         (lambda: time.sleep(3) or "at last", 1),
         (lambda: "the same", 0),

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.speed import bags, memory, pipes, startup
 from afm_scan_bench.speed.timing.ratios import by_turns, row
 from afm_scan_ros.core.errors import ScanError

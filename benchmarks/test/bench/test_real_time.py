@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+pytest.importorskip("rclpy")
+
 from afm_scan_bench.faults import drive, real_time, viewers
 from afm_scan_bench.faults.injection import clocked_scanner, trial
 from afm_scan_bench.faults.injection.clocked_scanner import ClockedScanner
