@@ -17,7 +17,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox, ReceivedBlock, block_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
-from afm_scan_ros.nodes.scan_node import ScanNode
+from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST, ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 
@@ -240,15 +240,22 @@ class StreamReader(BlockConsumer):
         return super().is_over() if self.follows_scan() else self.state == DONE
 
     def step(self) -> bool:
-        """End where blocks came, but no announcement of their scan."""
+        """End where blocks came, but no announcement of their scan.
+
+        A player's Fast DDS, whose heartbeats come every 3 s, repeats a lost one no sooner.
+        """
         waited = time.monotonic() - self._early_since if self._early else 0.0
-        if waited > self.settings["liveness_timeout_s"]:
+        if waited > SILENCE_AT_REST:
             self.follow(*self._early[0])  # raises
         return super().step()
 
     def refuses(self) -> bool:
-        """Return whether a block is another's; a bag does not wait until the node is ready."""
-        return self.follows_scan() and super().refuses()
+        """Return whether a block is another's.
+
+        Neither a bag nor a scan in which the node takes no part waits until the node is ready.
+        """
+        waits = self.follows_scan() and self.get_name() in self.scan.nodes
+        return waits and super().refuses()
 
     def receive(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> None:
         """Take the next block, or keep it until the scan is announced."""

@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import rclpy
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -25,8 +26,11 @@ from afm_scan_ros.nodes.topics import NODE_STATE
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NICENESS = -11
 """Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
-DISCOVERY = 1.0
-"""Longest wait, s, for a reader of the state of a node that cannot be made."""
+DISCOVERY = 4.0
+"""Longest waits, s, for readers of the state of a node that cannot be made, and until they have it.
+
+Fast DDS tells of a node, where the first word was lost, once more after 3 s.
+"""
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
@@ -93,6 +97,7 @@ def _report_refusal(name: str, error: InputError) -> None:
         time.sleep(IDLE)
     publisher.publish(state_message(None, node.get_name(), FAILED, 0, str(error)))
     Diagnostics(node).publish(FAILED, str(error), dict)
+    publisher.wait_for_all_acked(Duration(seconds=DISCOVERY))
     time.sleep(LINGER)
     node.destroy_node()
 

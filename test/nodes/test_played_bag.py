@@ -15,6 +15,7 @@ from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import Message, block_message, info_message, state_message
 from afm_scan_ros.nodes.peers import RUNNING, Report
+from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO
 from afm_scan_ros.nodes.topics import TRACKING_ERROR as ERRORS
 from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor
@@ -22,9 +23,9 @@ from helpers.in_process import SPEC, scan
 from helpers.ros import PATIENCE, joined, publisher, until
 
 READERS = ("tracking_monitor", "scan_imager", "residual_monitor")
-SILENCE = 0.2
+SILENCE = 1.0
 """Seconds that a node of a scan may be silent."""
-PAUSE = 10 * SILENCE
+PAUSE = 3 * SILENCE
 BLOCK = 5000
 PAUSE_AT = 4 * BLOCK
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))
@@ -89,7 +90,7 @@ def test_blocks_wait_for_the_announcement_of_their_scan(player: Node, *, announc
         topics[SCAN_INFO].publish(info_message(info))
         until(lambda: monitor.next_sample == BLOCK, monitor)
     else:
-        time.sleep(monitor.settings["liveness_timeout_s"])
+        time.sleep(SILENCE_AT_REST)
         with pytest.raises(ScanError, match="a block came before scan_info"):
             monitor.step()
     monitor.destroy_node()

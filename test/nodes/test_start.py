@@ -71,7 +71,7 @@ def test_what_keeps_a_node_from_being_made_is_logged_and_told_the_others() -> No
         listener.create_subscription(topic.kind, topic.name, heard.append, topic.reader)
         code = "from afm_scan_ros.nodes import start; raise SystemExit(start('scan_imager'))"
         with run(code, "--ros-args", "-p", "sample_file:=nowhere.npy") as node:
-            until(lambda: node.poll() is not None, listener)
+            until(lambda: heard and node.poll() is not None, listener)
             _, said = node.communicate()
         listener.destroy_node()
     logged, last = said.splitlines()[-2:]
