@@ -66,9 +66,13 @@ def fill(folder: Path, number: int, calm: Undisturbed, *, mounted: bool) -> Fill
     return done
 
 
+LOGGED = ("[", "\x1b[")
+"""Beginnings of lines that ROS logs, or Fast DDS: its shared memory is a file that may not grow."""
+
+
 def _judge(trial: Trial, calm: Undisturbed, done: Filled) -> None:
     message = trial.nodes[RECORDER].message
-    lines = [line for line in message.strip().split("\n") if not line.startswith("[")]
+    lines = [line for line in message.strip().split("\n") if not line.startswith(LOGGED)]
     if len(lines) != 1 or str(trial.bag) not in message or "make room" not in message:
         done.broken.append(f"the recorder reported: {message!r}")
     if set(trial.statuses().values()) != {INCOMPLETE}:

@@ -21,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.injection.faulty_scanner import (
     FAULT_AT,
+    HANGS,
     RECORDER,
     SCANNER,
     SILENT,
@@ -272,7 +273,7 @@ def _follow(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
 
 def _judge_words(trial: Trial, scanner: FaultyProcesses, done: DriveOutcome) -> None:
     """See that every node that can has failed, and that somebody named the reason."""
-    if scanner.fault.message != SILENT:
+    if scanner.fault.message not in (SILENT, HANGS):
         trial.until(lambda: scanner.node.poll() is not None)
         if scanner.node.returncode not in (1, INCOMPLETE):
             done.broken.append(f"the scanner's node ended with {scanner.node.returncode}")

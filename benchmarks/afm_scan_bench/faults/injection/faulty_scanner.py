@@ -77,6 +77,7 @@ class Fault:
 _BUG = "ZeroDivisionError: injected"
 SOURCE, SCANNER, RECORDER = "excitation_generator", "piezoscanner_sim", "scan_recorder"
 SILENT = f"{SCANNER} has been silent"
+HANGS = f"{SCANNER} has finished no sample"
 _SOURCE_SILENT = f"{SOURCE} has been silent"
 _RECORDER_SILENT = f"{RECORDER} has been silent"
 _LOST = "the sensor is lost"
@@ -101,12 +102,12 @@ FAULTS = (
     ),
     Fault("driver answers half a second late", "advance of the driver took", driver="LateScanner"),
     Fault("driver hangs, another thread can ramp", "has not answered", driver="HungScanner"),
-    Fault("forged drive of this scan", "another publisher", forged=True),
+    Fault("forged drive of this scan", "drive_voltage", forged=True),
     Fault("scanner's node stopped (SIGSTOP)", SILENT, number=signal.SIGSTOP),
     Fault("source's node stopped (SIGSTOP)", _SOURCE_SILENT, number=signal.SIGSTOP, to=SOURCE),
     Fault("publish blocks, the interpreter locked", SILENT, viewer=True),
     Fault("a callback hangs, the interpreter locked", SILENT, "consume", _hang),
-    Fault("a callback hangs, its heartbeat goes on", SCANNER, "consume", _sleep),
+    Fault("a callback hangs, its heartbeat goes on", HANGS, "consume", _sleep),
     Fault("sensor lost (constant reading)", _LOST, driver="LostSensor"),
     Fault("sensor reads NaN", _LOST, driver="NanSensor"),
     Fault("sensor clipped", "which is clipped", driver="ClippedSensor"),

@@ -80,7 +80,7 @@ def _judge_words(trial: Trial, killed: float, done: Killed) -> None:
         if trial.nodes[name].status != INCOMPLETE:
             done.broken.append(f"{name} ended with status {trial.nodes[name].status}")
         if name not in failed or done.victim not in failed[name].reason:
-            done.broken.append(f"{name} did not report that {done.victim} is missing")
+            done.broken.append(f"{name} did not report {done.victim}, but {failed.get(name)}")
         else:
             moments.append(failed[name].moment - killed)
     done.reported_after = max(moments, default=done.reported_after)

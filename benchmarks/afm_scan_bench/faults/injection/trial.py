@@ -48,8 +48,12 @@ FLOW: Mapping[str, Mapping[str, object]] = {
     "tracking_monitor": {"min_subscriptions": 1},
 }
 PATIENT: Mapping[str, Mapping[str, object]] = {
-    **{name: {"liveness_timeout_s": 5.0} for name in NODES},
-    "piezoscanner_sim": {"liveness_timeout_s": 5.0, "upstream_timeout_s": 5.0},
+    **{name: {"liveness_timeout_s": 5.0, "progress_timeout_s": 5.0} for name in NODES},
+    "piezoscanner_sim": {
+        "liveness_timeout_s": 5.0,
+        "progress_timeout_s": 5.0,
+        "upstream_timeout_s": 5.0,
+    },
 }
 """So that what the machine has no time for is not taken for gone."""
 
