@@ -7,12 +7,12 @@ from importlib import import_module
 from pathlib import Path
 
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.injection.outcome import LossError
 from afm_scan_bench.faults.injection.readings import refuse_other, written
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.declare import undeclared
+from afm_scan_ros.nodes.run import join
 from afm_scan_ros.nodes.scan_node import ScanNode
 
 UNKNOWN_PARAMETER = "started, with a warning of what it does not know"
@@ -41,7 +41,7 @@ def read_parameters(path: Path) -> str:
 @contextmanager
 def _joined(name: str, arguments: list[str], path: Path) -> Iterator[ScanNode]:
     try:
-        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        join([name, *arguments])
         node = _kind(name)()
         try:
             yield node
