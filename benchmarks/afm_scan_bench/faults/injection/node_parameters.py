@@ -26,7 +26,10 @@ def read_parameters(path: Path) -> str:
     bag = path.with_name("bag")
     arguments = ["--ros-args", "--params-file", str(path), "-p", f"bag:={bag}"]
     with _joined(name, arguments, path) as node:
-        ((section, body),) = written(path).items()
+        content = written(path)
+        if not content:  # an empty file sets nothing
+            return IGNORED
+        ((section, body),) = content.items()
         if section != f"/**/{name}":
             return IGNORED
         unknown = set(undeclared(node)) - {"bag"}
