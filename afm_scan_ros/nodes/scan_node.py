@@ -288,13 +288,14 @@ class ScanNode(Node, ABC):
         self.status = (
             2 if isinstance(error, InputError) else 3 if isinstance(error, ScanError) else 1
         )
-        self.state = FAILED
-        self.reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
+        reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
         try:
-            self.reason = self.settle(self.reason)
-            self.report()
+            reason = self.settle(reason)  # before the heartbeat says that the node has failed
         finally:
-            self.leave()
+            try:
+                self.go(FAILED, reason)
+            finally:
+                self.leave()
 
     def settle(self, reason: str) -> str:
         """Bring the node's outputs to a safe state after a failure; return a remark on it."""
