@@ -313,7 +313,7 @@ def test_an_error_is_one_line_without_control_characters(
     driver.advance(drive(0, 10), last=False)
     said = r"no card\n[INFO] the drive is at rest\x1b[2J\r; drive ramped down to 0 V within "
     assert until_ended(driver).startswith(said)
-    with pytest.raises(InputError, match=r"^driver faulty:LoudlyClosed: no card\\n\[INFO\] ready$"):
+    with pytest.raises(InputError, match=r"^driver faulty:LoudlyClosed: no card \[INFO\] ready$"):
         opened("faulty:LoudlyClosed")
     assert "\n[INFO]" not in capfd.readouterr().err
 
