@@ -288,12 +288,11 @@ class ScanNode(Node, ABC):
         self.status = (
             2 if isinstance(error, InputError) else 3 if isinstance(error, ScanError) else 1
         )
-        self.state = FAILED
-        self.reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
+        reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
         try:
-            self.reason = self.settle(self.reason)
-            self.report()
+            reason = self.settle(reason)
         finally:
+            self.go(FAILED, reason)  # not before: the heartbeat's thread would say half of it
             self.leave()
 
     def settle(self, reason: str) -> str:
