@@ -107,5 +107,5 @@ $(FLOOR)/ready: $(INPUTS) $(FLOOR_VERSIONS)
 # Files that are edited need no rebuild: they are linked.
 PACKAGE := $(shell find afm_scan_ros config launch msg -type d -not -name __pycache__) $(wildcard msg/*)
 $(ROS)/ready: $(INPUTS) $(FLOOR_VERSIONS) CMakeLists.txt scripts/jazzy_by_pip.sh $(PACKAGE)
-	scripts/jazzy_by_pip.sh $(ROS) --symlink-install
+	scripts/jazzy_by_pip.sh $(ROS)
 	@touch $@

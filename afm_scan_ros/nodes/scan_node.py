@@ -290,10 +290,12 @@ class ScanNode(Node, ABC):
         )
         reason = str(error) if self.status > 1 else f"{type(error).__name__}: {error}"
         try:
-            reason = self.settle(reason)
+            reason = self.settle(reason)  # before the heartbeat says that the node has failed
         finally:
-            self.go(FAILED, reason)  # not before: the heartbeat's thread would say half of it
-            self.leave()
+            try:
+                self.go(FAILED, reason)
+            finally:
+                self.leave()
 
     def settle(self, reason: str) -> str:
         """Bring the node's outputs to a safe state after a failure; return a remark on it."""

@@ -71,7 +71,7 @@ def test_only_the_sources_of_a_drive_publish_one_and_viewers_read_no_blocks() ->
 OWN = {
     "scan_recorder": {"bag": "bag"},
     "scanner_driver": {
-        "driver": "afm_scan_ros.drivers:SimulatedScanner",
+        "driver": "simulated",
         "settings_file": str(CONFIG / "simulated_scanner.yaml"),
     },
     "residual_monitor": {"model": str(CONFIG / "model.yaml")},
