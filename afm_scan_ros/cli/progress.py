@@ -9,6 +9,7 @@ from rich.progress import Progress, TaskID
 
 from afm_scan_ros.cli.options import in_lines
 from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.report.terminal import visible
 
 
 @frozen(eq=False)
@@ -30,7 +31,7 @@ class ScanProgress:
 
     def say(self, news: str) -> None:
         """Show what the user should know, once and to stay."""
-        self._bar.console.print(news, highlight=False, soft_wrap=True, markup=False)
+        self._bar.console.print(visible(news), highlight=False, soft_wrap=True, markup=False)
 
 
 def _ignore(doing: str) -> None:
