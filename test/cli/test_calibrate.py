@@ -149,8 +149,9 @@ def test_a_block_may_compute_for_long_in_simulation(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("slow_source")
 def test_in_real_time_silence_ends_a_run_which_can_be_tried_again(tmp_path: Path) -> None:
     failed, scanner = tmp_path / "out/rest.failed", DrivenScanner(time_scale=1.0)
+    said = r"(been silent|finished no sample) for 0\.\d+ s.*recorded is in .*failed"
     for _ in range(2):
-        with pytest.raises(ScanError, match=r"silent for 0\.[38] s.*recorded is in .*failed"):
+        with pytest.raises(ScanError, match=said):
             run_calibration(scanner, tmp_path / "out", [EXPERIMENTS["rest"].plan()])
         assert list((tmp_path / "out").iterdir()) == [failed]
         assert read_scan(failed).info.pattern == "rest"

@@ -142,7 +142,7 @@ def test_ros_without_messages_is_told_once(
     run_scan(files(spec), ("none",))
     said = capfd.readouterr().err
     assert said.count("the messages of afm_scan_ros are not built") == 1
-    assert said.count("\n") == 1
+    assert len(said.strip().splitlines()) == 1  # rich 13.7 adds an empty one
     assert read_scan(spec.parent / "bag").warnings == ()
 
 
