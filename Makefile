@@ -63,7 +63,7 @@ test-faults: $(ROS)/ready
 
 # Tests that need ROS are skipped without it. pytest fails where it finds no test.
 pytest_on_ros = $(ROS)/run python -c "import rclpy, afm_scan_ros.msg" && \
-	  $(ROS)/run python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(1)
+	  PYTHONPATH=$(CURDIR)/benchmarks $(ROS)/run python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(1)
 
 test-evidence: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence test
