@@ -15,19 +15,21 @@ EXCHANGES := --ignore=test/drivers --ignore=test/nodes --ignore=test/cli/test_ca
 # What starts nodes, and all that a command does otherwise where there is ROS. Each worker has a
 # domain of its own.
 ON_ROS := test/nodes test/drivers test/cli test/test_launch.py
-FAULTS_ON_ROS := $(wildcard benchmarks/test/bench/test_*fault*.py benchmarks/test/bench/test_pipes.py benchmarks/test/bench/test_real_time.py)
+FAULTS_ON_ROS := $(wildcard benchmarks/test/bench/test_*fault*.py benchmarks/test/bench/test_pipes.py) \
+  benchmarks/test/bench/test_real_time.py
 INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource/executables.txt
 
 # Tests start many processes, each of which would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-suite test-nodes test-ros test-evidence check docs test-floor clean
+.PHONY: help demo test test-suite test-nodes test-ros test-faults test-evidence check docs test-floor clean
 
 help:
 	@echo "make demo           scan a simulated scanner without and with compensation; report in demo/"
 	@echo "make test           run the test suite of the product, with the nodes where ROS can be had"
 	@echo "make test-ros       run the tests of nodes, drivers and commands on a ROS 2 made from wheels"
+	@echo "make test-faults    inject faults into scans of nodes, on the same ROS"
 	@echo "make test-evidence  run the tests of the benchmarks, and those of the product that take long"
 	@echo "make check          run the linter, the type checker and the examples, and build the site"
 	@echo "make docs           build the documentation site in site/"
@@ -52,10 +54,12 @@ test-nodes: $(ROS)/ready
 test-ros: $(ROS)/ready
 	$(call pytest_on_ros,-m "not evidence" $(ON_ROS))
 	$(call pytest_on_ros,-m evidence test/nodes)
-	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,$(FAULTS_ON_ROS))
 	@if $(ROS)/run python -c "import ctypes; ctypes.CDLL('librmw_cyclonedds_cpp.so')" 2>/dev/null; then \
 	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-m "not evidence" test/nodes); \
 	else echo "make test-ros: this ROS has no rmw_cyclonedds_cpp: the nodes were tested on Fast DDS alone"; fi
+
+test-faults: $(ROS)/ready
+	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,$(FAULTS_ON_ROS))
 
 # Tests that need ROS are skipped without it. pytest fails where it finds no test.
 pytest_on_ros = $(ROS)/run python -c "import rclpy, afm_scan_ros.msg" && \

@@ -24,12 +24,7 @@ DOCUMENTS = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 EVERY_LINE = re.MULTILINE | re.DOTALL
-MOST_WORDS = 30
-"""In a sentence."""
 MOST_README_LINES = 120
-ABBREVIATIONS = {"e.g.", "i.e.", "cf.", "vs.", "al.", "Eq.", "Eqs.", "Fig.", "Figs.", "No."} | {
-    "Dyn.", "Sys.", "Meas.", "Trans.", "pp."
-}  # fmt: skip
 
 
 def relative(path: Path) -> str:
@@ -110,48 +105,6 @@ def test_links_lead_somewhere(path: Path, generated: set[Path]) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text("utf-8")):
         file = (path.parent / target).resolve()
         assert "://" in target or file.exists() or file in generated, target
-
-
-@pytest.mark.parametrize("path", DOCUMENTS, ids=relative)
-def test_no_sentence_is_long(path: Path) -> None:
-    long = [s for s in sentences(path.read_text("utf-8")) if words(s) > MOST_WORDS]
-    assert not long, "\n".join(f"{words(s)} words: {s}" for s in long)
-
-
-def test_sentences_are_distinguished() -> None:
-    text = """# A heading
-
-A first one, e.g. by `a. b. c`. It is 2 V. See [Fig. 3 of
-this](x.md) for 0.5 V of D. Croft et al. in 2001!
-Is it on
-two lines?
-
-    code. code
-
-- an item. `afm-scan` begins another
-  that goes on
-- the next $a. b$
-
-| cell one. two | three |
-|---|---|
-
-```bash
-nothing. here
-```
-"""
-    assert list(sentences(text)) == [
-        "A heading",
-        "A first one, e.g. by Code.",
-        "It is 2 V.",
-        "See Fig. 3 of this for 0.5 V of D. Croft et al. in 2001!",
-        "Is it on two lines?",
-        "an item.",
-        "Code begins another that goes on",
-        "the next Code",
-        "cell one.",
-        "two",
-        "three",
-    ]
 
 
 def test_the_readme_is_short() -> None:
@@ -243,56 +196,6 @@ def test_the_reference_gives_every_option_a_meaning(generator: dict[str, Any], n
 def test_the_page_without_ros_names_the_commands_that_start_no_node() -> None:
     page = (ROOT / "docs/how_to/without_ros.md").read_text("utf-8")
     assert not [name for name in COMMANDS if f"`{name}`" not in page and f"scan {name}" not in page]
-
-
-def sentences(markdown: str) -> Iterator[str]:
-    """Sentences of a page; code counts as one word, headings, items and table cells each alone."""
-    for unit in units(markdown):
-        found: list[str] = []
-        for word in unit.split():
-            found.append(word)
-            plain = word.rstrip("\"')]*")
-            volt = len(found) > 1 and found[-2][-1].isdigit()  # "0.5 V." ends a sentence
-            initial = re.fullmatch(r"\(?[A-Z]\.", plain) and not volt
-            if plain.endswith((".", "!", "?")) and plain not in ABBREVIATIONS and not initial:
-                yield " ".join(found)
-                found = []
-        if found:
-            yield " ".join(found)
-
-
-def units(markdown: str) -> Iterator[str]:
-    """Runs of text in which sentences follow each other."""
-    text = re.sub(r"^ *```.*?^ *```$|^\$\$.*?\$\$|<!--.*?-->", "", markdown, flags=EVERY_LINE)
-    text = re.sub(r"`[^`]+`|\$[^$\n]+\$", "Code", text)
-    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
-    for block in re.split(r"\n\s*\n", text):
-        if re.match(r"\n*(    |\t)\S", block):
-            continue
-        yield from units_of(block.strip("\n").splitlines())
-
-
-def units_of(lines: list[str]) -> Iterator[str]:
-    held: list[str] = []
-    for line in lines:
-        item = re.match(r"\s*(?:[-*+]|\d+\.)\s+(.*)", line)
-        apart = line.startswith("#") or line.lstrip().startswith("|")
-        if (item or apart) and held:
-            yield " ".join(held)
-            held = []
-        if line.startswith("#"):
-            yield line.lstrip("# ")
-        elif apart:
-            cells = (cell.strip() for cell in re.split(r"(?<!\\)\|", line))
-            yield from (cell for cell in cells if re.search(r"\w", cell))
-        else:
-            held.append((item[1] if item else line).lstrip("> ").strip())
-    if held:
-        yield " ".join(held)
-
-
-def words(sentence: str) -> int:
-    return sum(bool(re.search(r"\w", word)) for word in sentence.split())
 
 
 def texts_of_the_package() -> Iterator[str]:
