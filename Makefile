@@ -53,12 +53,12 @@ test-nodes: $(ROS)/ready
 # Where ROS has them, the nodes are tested on its other usual middleware too.
 test-ros: $(ROS)/ready
 	$(call pytest_on_ros,-m "not evidence" $(ON_ROS))
-	$(call pytest_on_ros,-m evidence test/nodes)
 	@if $(ROS)/run python -c "import ctypes; ctypes.CDLL('librmw_cyclonedds_cpp.so')" 2>/dev/null; then \
 	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-m "not evidence" test/nodes); \
 	else echo "make test-ros: this ROS has no rmw_cyclonedds_cpp: the nodes were tested on Fast DDS alone"; fi
 
 test-faults: $(ROS)/ready
+	$(call pytest_on_ros,-m evidence test/nodes)
 	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,$(FAULTS_ON_ROS))
 
 # Tests that need ROS are skipped without it. pytest fails where it finds no test.
