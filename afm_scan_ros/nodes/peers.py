@@ -123,6 +123,10 @@ class Peers:
         least = min((each.next_sample for each in going), default=0)
         if all(stands[each.node] <= timeout for each in going if each.next_sample == least):
             return None
+        source = reports[0]
+        fills = stands[source.node] <= pause and source.next_sample - least <= info.window // 2
+        if fills and all(each.state == READY for each in going if each.next_sample == least):
+            return None  # the preview: nothing has moved yet
         silent = {e.node: now - max(began, e.heard) for e in reports if e.node != own.node}
         longest = max(silent, key=lambda name: silent[name])
         if silent[longest] > 0.5 * timeout:  # for which the source may have paused
