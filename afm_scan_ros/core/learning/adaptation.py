@@ -211,12 +211,14 @@ class Adaptation:
 
     ``time_constant`` (s) is the estimator's memory: its bandwidth is 1 / (2π ``time_constant``).
     Raises InputError where the model states no error, or has no resonance below half the sample
-    rate.
+    rate. Its loops are compiled when it is made, not while others wait.
     """
 
     def __init__(
         self, model: ScannerModel, spec: ScanSpec, time_constant: float = TIME_CONSTANT
     ) -> None:
+        rest = Trace(0, spec.sample_period, np.zeros(2), np.zeros(2))
+        list(ScanSignals(model, spec).add(rest, rest))
         self._signals = ScanSignals(model, spec)
         limits, memory = expected_limits(model, spec), time_constant * spec.line_rate
         self._axes = {}

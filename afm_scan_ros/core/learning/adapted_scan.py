@@ -46,6 +46,8 @@ class AdaptedScan:
         period = spec.sample_period
         self._filters = {name: ReferenceFilter(model.axis(name), period) for name in AXES}
         self._states = {name: each.at_rest() for name, each in self._filters.items()}
+        for name, each in self._filters.items():  # compiled now, not while a scan waits
+            each.apply(self._states[name], np.zeros(1), AxisShift().weights[:, None])
         self._waiting: deque[Trace] = deque()
         self._aligner = Aligner((DRIVE, MEASURED))
         unchanged = dict.fromkeys(AXES, AxisShift().weights)
