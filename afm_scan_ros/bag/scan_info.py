@@ -203,13 +203,16 @@ def encode_block(type_name: str, info: ScanInfo, trace: Trace, *, last: bool) ->
 
 
 def decode_block(type_name: str, cdr: bytes) -> Block:
-    """Block of samples from its CDR; raises ValueError where it is not one."""
+    """Block of samples from its CDR; raises ValueError where it is not one.
+
+    The samples are copied, for compiled loops take arrays that can be written.
+    """
     message = decode(type_name, cdr)
     trace = Trace(
         int(message.first_sample),
         float(message.sample_period),
-        np.asarray(message.x, dtype=np.float64),
-        np.asarray(message.y, dtype=np.float64),
+        np.array(message.x, dtype=np.float64),
+        np.array(message.y, dtype=np.float64),
     )
     return Block(message.scan_id, trace, bool(message.last))
 

@@ -6,6 +6,7 @@ last. The time in which the driver works does not count. Each of its calls has a
 one that returns later is followed by the ramp, and one that does not return is ended.
 """
 
+import gc
 import math
 import os
 import signal
@@ -100,6 +101,8 @@ class DriverHost:
         with refusing("the driver does not start"), bounded("start", self._waits.opening):
             driver.start(sample_period)
             self._started, self._late = True, driver.latency_samples * sample_period
+        gc.collect()
+        gc.freeze()  # what is loaded stays: to look through it again would take longer than a block
         priority = take_priority() if self._waits.real_time else "no real-time priority: no need"
         started = {"latency_samples": driver.latency_samples, "priority": priority}
         self._answer(Message(STARTED, started))

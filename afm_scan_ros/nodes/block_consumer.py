@@ -10,11 +10,11 @@ from functools import partial
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_from_message
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block, info_from_message
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox, ReceivedBlock, block_message
+from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST, ScanNode
@@ -44,7 +44,7 @@ class BlockConsumer(ScanNode):
 
     def __init__(self) -> None:
         super().__init__()
-        self._followed: list[str] = []
+        self._followed: list[NodeTopic] = []
         self._block_guards: dict[str, BlockGuard] = {}
         self._preparation: Iterator[str] | None = None
         self._outputs: dict[str, tuple[Outbox, int]] = {}
@@ -63,12 +63,12 @@ class BlockConsumer(ScanNode):
         """Subscribe to topics of blocks."""
         for topic in topics:
             self.expect(topic)
-            self.subscribe(topic, partial(self.receive, topic))
+            self.subscribe(topic, partial(self.receive, topic), raw=True)
 
     def expect(self, topic: NodeTopic) -> None:
         """Take a topic as one whose every block is to be received."""
         self.listen_to(topic)
-        self._followed.append(topic.name)
+        self._followed.append(topic)
 
     def write(self, topic: NodeTopic, readers: int) -> None:
         """Publish a topic that must have a number of readers before the node is ready.
@@ -80,13 +80,13 @@ class BlockConsumer(ScanNode):
         publisher = self.create_publisher(topic.kind, topic.name, topic.writer)
         self._outputs[topic.name] = (Outbox(publisher), readers)
 
-    def publish(self, topic: NodeTopic, message: Message) -> None:
-        """Publish a message."""
+    def publish(self, topic: NodeTopic, message: Message | bytes) -> None:
+        """Publish a message, or one that is serialised already."""
         self._outputs[topic.name][0].send(message, time.monotonic())
 
     def send(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:
         """Publish a block."""
-        self.publish(topic, block_message(topic.kind, self.scan, block, last=last))
+        self.publish(topic, encode_block(topic.type_name, self.scan, block, last=last))
 
     def step(self) -> bool:
         """Prepare, declare the node ready when its topics are there, leave when the source does."""
@@ -140,18 +140,19 @@ class BlockConsumer(ScanNode):
         """Return how long the node has worked (s)."""
         return self.busy
 
-    def receive(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> None:
+    def receive(self, topic: NodeTopic, cdr: bytes, number: int) -> None:
         """Take the next block of a topic; raises ScanError where it is not the expected one.
 
-        ``number`` is that of the message among those of its publisher.
+        ``cdr`` is the message as it came over the wire, ``number`` its number among those of its
+        publisher.
         """
         if self.leaving:
             return
         if self.refuses():
             why = self.reason or "is not ready"
             raise ScanError(f"{topic.name}: a block came while this node {why}")
-        block = self.follow(topic, message, number)
-        self.consume(topic, block, last=message.last)
+        block = self.follow(topic, cdr, number)
+        self.consume(topic, block, last=self._block_guards[topic.name].complete)
         self.advance()
 
     def refuses(self) -> bool:
@@ -166,15 +167,15 @@ class BlockConsumer(ScanNode):
         """Whether the node is still to say that it is ready."""
         return self.state == READY and not self.ready
 
-    def follow(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> Trace:
+    def follow(self, topic: NodeTopic, cdr: bytes, number: int) -> Trace:
         """Return the block if it is the expected one; raises ScanError otherwise."""
         info = self.scan
         if topic.name not in self._block_guards:
+            about = info.scan_id, info.sample_period, info.total_samples
             self._block_guards = {
-                name: BlockGuard(name, info.scan_id, info.sample_period, info.total_samples)
-                for name in self._followed
+                each.name: BlockGuard(each.name, each.type_name, *about) for each in self._followed
             }
-        block = self._block_guards[topic.name].accept(message, number)
+        block = self._block_guards[topic.name].accept(cdr, number)
         self.note_block(block.x.size)
         if self.state == READY:
             self.go(RUNNING)
@@ -188,7 +189,7 @@ class BlockConsumer(ScanNode):
 
     def counted(self) -> Sequence[str]:
         """Return the topics whose samples are the node's progress."""
-        return self._followed
+        return [topic.name for topic in self._followed]
 
     def _meet(self, message: Message, _: int) -> None:
         if self.info is not None:
@@ -221,7 +222,7 @@ class StreamReader(BlockConsumer):
     def __init__(self) -> None:
         super().__init__()
         self._source_was_there = False
-        self._early: list[tuple[NodeTopic, ReceivedBlock, int]] = []
+        self._early: list[tuple[NodeTopic, bytes, int]] = []
         self._early_since = 0.0
 
     def follows_scan(self) -> bool:
@@ -257,15 +258,15 @@ class StreamReader(BlockConsumer):
         waits = self.follows_scan() and self.get_name() in self.scan.nodes
         return waits and super().refuses()
 
-    def receive(self, topic: NodeTopic, message: ReceivedBlock, number: int) -> None:
+    def receive(self, topic: NodeTopic, cdr: bytes, number: int) -> None:
         """Take the next block, or keep it until the scan is announced."""
         if self.info is None:
             self._early_since = self._early_since or time.monotonic()
-            self._early.append((topic, message, number))
+            self._early.append((topic, cdr, number))
             return
         while not self.leaving and self.prepares():
             pass
-        super().receive(topic, message, number)
+        super().receive(topic, cdr, number)
 
     def _meet(self, message: Message, number: int) -> None:
         super()._meet(message, number)

@@ -7,11 +7,11 @@ from math import ceil
 
 from attrs import evolve
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.flow import MAX_MESSAGE_RATE, USUAL_WINDOW, block_size_at
-from afm_scan_ros.nodes.messages import Outbox, block_message, info_message
+from afm_scan_ros.nodes.messages import Outbox, info_message
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
@@ -128,8 +128,8 @@ class BlockSource(ScanNode):
         if ahead or now < self._due_at() or not self._blocks.flush(now):
             return False
         block = self.block(self.next_sample, count)
-        message = block_message(self._topic.kind, self.scan, block, last=end == self.total)
-        self._blocks.send(message, now)
+        cdr = encode_block(self._topic.type_name, self.scan, block, last=end == self.total)
+        self._blocks.send(cdr, now)
         self._log_progress(self.next_sample, end)
         self.advance_to(end)
         return True

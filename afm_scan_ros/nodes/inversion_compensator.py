@@ -28,6 +28,7 @@ class InversionCompensator(BlockConsumer):
     @classmethod
     def warm_up(cls) -> None:
         """Invert a moment of a scan by the default model."""
+        super().warm_up()
         defaults = {each.name: each.default for each in (MODEL_FILE, *INVERSION)}
         inversion = ScanInversion(model_of(defaults), ScanSpec(), inversion_settings(defaults))
         list(inversion.desired(desired(ScanSpec(), 0, 2), last=False))

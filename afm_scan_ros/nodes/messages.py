@@ -1,9 +1,8 @@
 """Messages made from records of core, sent in order, and checks of the blocks that come in."""
 
-from array import array
 from collections import deque
 from math import isfinite
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from attrs import asdict, define, field
@@ -12,13 +11,16 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_fields
+from afm_scan_ros.bag.scan_info import Block, ScanInfo, decode_block, info_fields
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import MAX_BLOCK, LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.msg import MonitorSample as MonitorSampleMessage
 from afm_scan_ros.msg import NodeState, TrackingError
 from afm_scan_ros.msg import ScanInfo as ScanInfoMessage
+
+if TYPE_CHECKING:
+    from array import array
 
 Message: TypeAlias = Any
 """Of a class that rosidl makes from a definition in ``msg/``."""
@@ -27,22 +29,13 @@ NOT_TOLD = 2**64 - 1
 """Number of a message where the middleware does not count them."""
 
 
-class ReceivedBlock(Protocol):
-    """Fields that DisplacementBlock and VoltageBlock share."""
-
-    scan_id: str
-    first_sample: int
-    sample_period: float
-    x: Any
-    y: Any
-    last: bool
-
-
 class BlockGuard:
     """Checks the blocks of one topic through one scan; refuses any that differs from the scan."""
 
-    def __init__(self, topic: str, scan_id: str, sample_period: float, total_samples: int) -> None:
-        self.topic = topic
+    def __init__(
+        self, topic: str, type_name: str, scan_id: str, sample_period: float, total_samples: int
+    ) -> None:
+        self.topic, self.type_name = topic, type_name
         self.scan_id = scan_id
         self.sample_period = sample_period
         self.total_samples = total_samples
@@ -50,30 +43,34 @@ class BlockGuard:
         self.complete = False
         self._number: int | None = None
 
-    def accept(self, block: ReceivedBlock, number: int) -> Trace:
+    def accept(self, cdr: bytes, number: int) -> Trace:
         """Return the samples of the block that follows on the one before.
 
-        ``number`` is that of the message among those of its publisher, where DDS tells it: all
-        blocks are of one publisher.
+        ``cdr`` is the message as it came over the wire, and ``number`` its number among those of
+        its publisher, where DDS tells it: all blocks are of one publisher.
         Raises ScanError naming the topic, the sample and what is wrong with it.
         """
-        x, y = (np.asarray(samples, dtype=np.float64) for samples in (block.x, block.y))
+        try:
+            block = decode_block(self.type_name, cdr)
+        except ValueError as error:
+            raise ScanError(f"{self.topic}: {error}") from error
+        trace = block.trace
         self._check_scan(block)
-        self._check_size(x, y)
-        self._check_place(block.first_sample, block.first_sample + len(x))
-        self._check_numbers(x, y)
+        self._check_size(trace.x, trace.y)
+        self._check_place(trace.first_sample, trace.first_sample + len(trace.x))
+        self._check_numbers(trace.x, trace.y)
         self._check_publisher(number)
-        self.next_sample += len(x)
+        self.next_sample += len(trace.x)
         self.complete = block.last
-        return Trace(block.first_sample, self.sample_period, x, y)
+        return trace
 
-    def _check_scan(self, block: ReceivedBlock) -> None:
+    def _check_scan(self, block: Block) -> None:
         if block.scan_id != self.scan_id:
             self._refuse(f"a block of scan '{block.scan_id}' came during scan '{self.scan_id}'")
-        if block.sample_period != self.sample_period:
+        if (trace := block.trace).sample_period != self.sample_period:
             self._refuse(
                 f"the sample period changed from {self.sample_period:g} s to"
-                f" {block.sample_period:g} s at sample {block.first_sample}"
+                f" {trace.sample_period:g} s at sample {trace.first_sample}"
             )
 
     def _check_size(self, x: Array, y: Array) -> None:
@@ -114,19 +111,6 @@ class BlockGuard:
 def info_message(info: ScanInfo) -> Message:
     """Return the message that announces a scan."""
     return ScanInfoMessage(header=_header(info, 0), **info_fields(info))
-
-
-def block_message(kind: type[Message], info: ScanInfo, block: Trace, *, last: bool) -> Message:
-    """Return a block as a message of the class ``kind``."""
-    return kind(
-        header=_header(info, block.first_sample),
-        scan_id=info.scan_id,
-        first_sample=block.first_sample,
-        sample_period=info.sample_period,
-        x=_doubles(block.x),
-        y=_doubles(block.y),
-        last=last,
-    )
 
 
 def tracking_message(info: ScanInfo, error: LineError) -> Message:
@@ -172,10 +156,6 @@ def _header(info: ScanInfo, sample: int) -> Message:
     header = Header(frame_id="scanner")
     header.stamp.sec, header.stamp.nanosec = divmod(info.stamp(sample), 10**9)
     return header
-
-
-def _doubles(samples: Array) -> "array[float]":
-    return array("d", samples.tobytes())  # rclpy would look at each element of anything else
 
 
 AFTERLIFE = 22.0

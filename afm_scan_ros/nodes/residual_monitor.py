@@ -30,6 +30,7 @@ class ResidualMonitor(StreamReader):
     @classmethod
     def warm_up(cls) -> None:
         """Predict a moment of a scan by the default model."""
+        super().warm_up()
         model = model_of({MODEL_FILE.name: MODEL_FILE.default})
         predict(model, desired(ScanSpec(), 0, 2))
 

@@ -1,5 +1,6 @@
 """Runs one node as a process: its loop, its signals and its exit status."""
 
+import gc
 import os
 import signal
 import sys
@@ -119,6 +120,8 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     name = node.get_name()  # rclpy forgets it with the node
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    gc.collect()
+    gc.freeze()  # what is loaded stays: to look through it again would take longer than a block
     try:
         live(node, executor, caught)
     finally:
@@ -142,12 +145,15 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
 
 
 def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
-    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has."""
-    if node.take_messages(IDLE):
-        wait = 0.0
-    else:
+    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has.
+
+    The executor serves what is no message: parameters, services and the states of a lifecycle.
+    """
+    if not node.take_messages(IDLE):
         node.all_heard()
-    executor.spin_once(timeout_sec=wait)
+        node.await_message(wait)
+    if node.services_are_due():
+        executor.spin_once(timeout_sec=0.0)
 
 
 def _fail(node: ScanNode, error: Exception) -> None:

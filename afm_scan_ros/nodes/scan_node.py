@@ -6,18 +6,22 @@ from collections.abc import Callable, Iterable, Mapping
 from re import sub
 from threading import Event, RLock, Thread
 
+import numpy as np
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
+from rclpy.utilities import timeout_sec_to_nsec
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, decode_block, encode_block
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
-from afm_scan_ros.nodes.topics import NODE_STATE, NodeTopic
+from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE, NodeTopic
 
 HEARTBEAT = 0.05
 """Seconds between two states of a node."""
@@ -25,6 +29,8 @@ WATCH = 0.02
 """Seconds between two looks at the other nodes."""
 SILENCE_AT_REST = 5.0
 """Silence (s) of the source after which a node no longer waits for its scan: nothing moves yet."""
+SERVICE = 0.02
+"""Longest time, s, for which a request of a service waits."""
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
@@ -80,6 +86,7 @@ class ScanNode(Node, ABC):
         self._reported = 0
         self._logged = ""
         self._next_watch = self._started = self._ticked = self._advanced = time.monotonic()
+        self._next_service = self._started
         self._all_heard_at = self._started
         self.calls = 0
         self.busy = 0.0
@@ -100,6 +107,9 @@ class ScanNode(Node, ABC):
     @classmethod
     def warm_up(cls) -> None:
         """Compute once what is slow the first time, before the node joins ROS."""
+        info, rest = ScanInfo("", 0, "", 1.0, 1), Trace(0, 1.0, np.zeros(1), np.zeros(1))
+        for topic in BLOCKS.values():
+            decode_block(topic.type_name, encode_block(topic.type_name, info, rest, last=False))
 
     @property
     def scan(self) -> ScanInfo:
@@ -160,7 +170,7 @@ class ScanNode(Node, ABC):
         """Call back for messages that have arrived, for so long at most; return whether any had.
 
         An executor builds its set of waitables anew for each message, which takes several times as
-        long as the message.
+        long as the message. What is waited for and taken here is so as in rclpy.wait_for_message.
         """
         deadline, before = time.monotonic() + seconds, self.calls
         busy = True
@@ -175,6 +185,23 @@ class ScanNode(Node, ABC):
                     callback(*taken)
                     busy = True
         return self.calls != before
+
+    def await_message(self, seconds: float) -> None:
+        """Wait until a message has arrived, for so long at most."""
+        counts = len(self._readers), 0, 0, 0, 0, 0
+        waits = rclpy_implementation.WaitSet(*counts, self.context.handle)
+        waits.clear_entities()
+        for subscription, _ in self._readers:
+            waits.add_subscription(subscription.handle)
+        waits.wait(timeout_sec_to_nsec(seconds))
+
+    def services_are_due(self) -> bool:
+        """Return whether services have waited for SERVICE; they have to, now."""
+        now = time.monotonic()
+        due = now >= self._next_service
+        if due:
+            self._next_service = now + SERVICE
+        return due
 
     def all_heard(self) -> None:
         """Note that no message that has arrived waits to be heard."""

@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 
 from rclpy.qos import DurabilityPolicy
-from rclpy.serialization import deserialize_message
 
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -57,7 +56,7 @@ class ScanRecorder(BlockConsumer):
         if self.leaving:
             return
         if topic.name in BLOCKS:
-            self.receive(topic, deserialize_message(data, topic.kind), number)
+            self.receive(topic, data, number)
             self._recorded = True
         self._bag.write(name, time.time_ns(), data)
         self._received[topic.name] += 1
@@ -115,5 +114,5 @@ class ScanRecorder(BlockConsumer):
     def _record(self, topic: NodeTopic) -> None:
         name = self.resolve_topic_name(topic.name)
         latched = topic.writer.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        self._bag.add_topic(name, f"afm_scan_ros/msg/{topic.kind.__name__}", latched=latched)
+        self._bag.add_topic(name, topic.type_name, latched=latched)
         self.subscribe(topic, partial(self.receive_raw, topic, name), raw=True)

@@ -61,6 +61,11 @@ class NodeTopic:
     writer: QoSProfile
     reader: QoSProfile
 
+    @property
+    def type_name(self) -> str:
+        """Name of the messages' type, as ``afm_scan_ros/msg/VoltageBlock``."""
+        return f"{self.kind.__module__.split('.')[0]}/msg/{self.kind.__name__}"
+
 
 def _blocks(name: str, kind: type[Message]) -> NodeTopic:
     return NodeTopic(name, kind, _EVERYTHING, _EVERYTHING)

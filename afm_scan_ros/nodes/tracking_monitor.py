@@ -3,15 +3,14 @@
 from collections.abc import Iterator
 from contextlib import suppress
 
-import numpy as np
 from rclpy._rclpy_pybind11 import RCLError
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, decode_block
 from afm_scan_ros.core.streams import LineErrors, MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
-from afm_scan_ros.nodes.messages import ReceivedBlock, monitor_message, tracking_message
+from afm_scan_ros.nodes.messages import monitor_message, tracking_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
 
 
@@ -27,7 +26,7 @@ class TrackingMonitor(StreamReader):
         self._samples: MonitorSamples
         self._viewers = self.create_publisher(MONITOR.kind, MONITOR.name, MONITOR.writer)
         self.write(TRACKING_ERROR, self.settings["min_subscriptions"])
-        self.subscribe(DRIVE, self._hear_drive)
+        self.subscribe(DRIVE, self._hear_drive, raw=True)
         self.read([DESIRED, ACHIEVED])
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
@@ -49,10 +48,10 @@ class TrackingMonitor(StreamReader):
             with suppress(RCLError):
                 self._viewers.publish(monitor_message(self.scan, sample))
 
-    def _hear_drive(self, message: ReceivedBlock, _: int) -> None:
-        if self.info is None or self.leaving or message.scan_id != self.info.scan_id:
+    def _hear_drive(self, cdr: bytes, _: int) -> None:
+        block = decode_block(DRIVE.type_name, cdr)
+        if self.info is None or self.leaving or block.scan_id != self.info.scan_id:
             return
         while self.prepares():
             pass
-        x, y = (np.asarray(samples, dtype=np.float64) for samples in (message.x, message.y))
-        self._show(DRIVE, Trace(message.first_sample, message.sample_period, x, y))
+        self._show(DRIVE, block.trace)

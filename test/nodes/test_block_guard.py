@@ -2,29 +2,30 @@
 
 from collections.abc import Iterable
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from afm_scan_ros.bag.typestore import encode
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import MAX_BLOCK
 from afm_scan_ros.nodes.messages import NOT_TOLD, BlockGuard
 
 TOTAL = 60
 PERIOD = 1e-4
+TYPE = "afm_scan_ros/msg/VoltageBlock"
 
 
-def block(first: int, count: int, **other: object) -> SimpleNamespace:
+def block(first: int, count: int, **other: object) -> bytes:
     samples = np.arange(first, first + count, dtype=np.float64)
     fields = {"scan_id": "s", "sample_period": PERIOD, "x": samples, "y": -samples, "last": False}
-    return SimpleNamespace(first_sample=first, **(fields | other))
+    return encode(TYPE, 0, {"first_sample": first, **fields, **other})
 
 
 def guard(total: int = TOTAL) -> BlockGuard:
-    return BlockGuard("drive_voltage", "s", PERIOD, total)
+    return BlockGuard("drive_voltage", TYPE, "s", PERIOD, total)
 
 
 cuts = st.sets(st.integers(1, TOTAL - 1)).map(lambda inner: [0, *sorted(inner), TOTAL])
@@ -41,7 +42,7 @@ def test_any_cut_of_a_scan_comes_back_whole(edges: list[int], first: int) -> Non
     assert watched.next_sample == TOTAL
 
 
-def accept(watched: BlockGuard, blocks: Iterable[SimpleNamespace]) -> None:
+def accept(watched: BlockGuard, blocks: Iterable[bytes]) -> None:
     for one in blocks:
         watched.accept(one, NOT_TOLD)
 
@@ -76,8 +77,8 @@ def test_a_repeated_block_is_refused(edges: list[int], data: st.DataObject) -> N
         ({"y": np.zeros(4)}, "sample 10: 5 x values but 4 y values"),
         ({"x": np.empty(0), "y": np.empty(0)}, "sample 10: 0 samples, not 1 to"),
         ({"x": np.zeros(MAX_BLOCK + 1), "y": np.zeros(MAX_BLOCK + 1)}, "10001 samples"),
-        ({"x": [0, 0, np.nan, 0, 0]}, "sample 12, x: nan is not a finite number"),
-        ({"y": [0, 0, 0, -np.inf, 0]}, "sample 13, y: -inf is not a finite number"),
+        ({"x": np.array([0, 0, np.nan, 0, 0])}, "sample 12, x: nan is not a finite number"),
+        ({"y": np.array([0, 0, 0, -np.inf, 0])}, "sample 13, y: -inf is not a finite number"),
     ],
 )
 def test_what_is_wrong_is_named(wrong: dict[str, object], named: str) -> None:
@@ -89,7 +90,7 @@ def test_what_is_wrong_is_named(wrong: dict[str, object], named: str) -> None:
 
 
 def test_numbers_are_taken_however_large() -> None:
-    taken = guard().accept(block(0, 3, x=[1e308, -1e308, 1e308], y=[1e308, 1e308, -1e308]), 1)
+    taken = guard().accept(block(0, 3, x=np.array([1e308, -1e308, 1e308]), y=np.full(3, 1e308)), 1)
     assert list(taken.x) == [1e308, -1e308, 1e308]
 
 

@@ -9,13 +9,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader
 from afm_scan_ros.nodes.diagnostics import PERIOD
-from afm_scan_ros.nodes.messages import Message, block_message
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import DESIRED, DIAGNOSTICS, NodeTopic
 from helpers.ros import PATIENCE, joined, publisher, until
@@ -84,7 +84,7 @@ def test_a_node_says_how_it_is(operator: Operator, reader: Reader) -> None:
     block = Trace(0, INFO.sample_period, np.zeros(500), np.zeros(500))
     blocks = publisher(operator, DESIRED)
     until(blocks.get_subscription_count, operator)
-    blocks.publish(block_message(DESIRED.kind, INFO, block, last=False))
+    blocks.publish(encode_block(DESIRED.type_name, INFO, block, last=False))
     until(lambda: reader.next_sample, reader)
     reader.go(RUNNING, "an alarm")
     operator.until(lambda: operator.last[name].level == status.WARN)

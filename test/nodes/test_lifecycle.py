@@ -10,11 +10,11 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTran
 from rclpy.node import Node
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.nodes.messages import Message, block_message
+from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
@@ -179,7 +179,7 @@ def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) 
     block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
     said = "drive_voltage: a block came while this node waits to be configured"
     with pytest.raises(ScanError, match=f"^{said}$"):
-        node.receive(DRIVE, block_message(DRIVE.kind, INFO, block, last=False), 1)
+        node.receive(DRIVE, encode_block(DRIVE.type_name, INFO, block, last=False), 1)
     node.destroy_node()
     assert (node.state, node.reason) == (FAILED, "deactivated at sample 0")
 

@@ -95,7 +95,7 @@ def test_ctrl_c_ramps_down_and_keeps_what_was_recorded(tmp_path: Path, settings:
     assert command.returncode == 130
     assert said.rstrip().endswith("afm-scan: interrupted")
     outputs = np.loadtxt(log, ndmin=2)
-    assert np.any(outputs[:, 2:])
+    assert np.any(outputs[:, 2:]), said
     assert not np.any(outputs[-1, 2:])
     kept = read_scan(tmp_path / "out/stepped_sine.failed").whole("drive_voltage")
     assert 0 < kept.x.size < 60.0 / kept.sample_period

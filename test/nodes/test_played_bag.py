@@ -8,12 +8,12 @@ import pytest
 from attrs import evolve
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block, info_of_scan
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import Message, block_message, info_message, state_message
+from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.peers import RUNNING, Report
 from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO
@@ -64,7 +64,7 @@ def test_a_pause_ends_no_reader(
             stop = min(end(stream), first + BLOCK)
             block = part(stream, first, stop)
             last = stop == end(stream)
-            topics[topic].publish(block_message(topic.kind, info, block, last=last))
+            topics[topic].publish(encode_block(topic.type_name, info, block, last=last))
         for name in READERS if states else ():
             state = state_message(info, name, RUNNING, abs(PAUSE_AT - first), "")
             topics[NODE_STATE].publish(state)
@@ -83,7 +83,7 @@ def test_blocks_wait_for_the_announcement_of_their_scan(player: Node, *, announc
     until(lambda: all(monitor.count_publishers(name) for name in monitor.inputs), monitor)
     for topic in (DESIRED, ACHIEVED):
         still = Trace(0, SPEC.sample_period, np.zeros(BLOCK), np.zeros(BLOCK))
-        topics[topic].publish(block_message(topic.kind, info, still, last=False))
+        topics[topic].publish(encode_block(topic.type_name, info, still, last=False))
     until(lambda: monitor.calls == 2, monitor)
     monitor.step()
     if announced:

@@ -17,11 +17,11 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Image
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes import block_source
-from afm_scan_ros.nodes.messages import Message, block_message, info_message, state_message
+from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.peers import FAILED, READY, RUNNING, Report
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
 from afm_scan_ros.nodes.run import hear
@@ -68,7 +68,7 @@ class Scan:
         samples = np.full(QUARTER, value)
         block = Trace(first, INFO.sample_period, samples, samples)
         last = first + QUARTER == INFO.total_samples
-        return block_message(self.topic.kind, INFO, block, last=last)
+        return encode_block(self.topic.type_name, INFO, block, last=last)
 
     def begin(self) -> None:
         """Send the first quarter."""

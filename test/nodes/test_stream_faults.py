@@ -10,9 +10,9 @@ from attrs import evolve
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import Message, block_message, info_message, state_message
+from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.run import live
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
 from afm_scan_ros.nodes.topics import DESIRED, NODE_STATE, SCAN_INFO
@@ -24,10 +24,10 @@ INFO = ScanInfo(
 Messages = Callable[[], list[Message]]
 
 
-def block(first: int, info: ScanInfo = INFO, value: float = 0.0) -> Message:
+def block(first: int, info: ScanInfo = INFO, value: float = 0.0) -> bytes:
     samples = np.full(100, value)
-    return block_message(
-        DESIRED.kind, info, Trace(first, info.sample_period, samples, samples), last=False
+    return encode_block(
+        DESIRED.type_name, info, Trace(first, info.sample_period, samples, samples), last=False
     )
 
 

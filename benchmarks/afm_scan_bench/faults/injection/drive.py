@@ -31,9 +31,8 @@ from afm_scan_bench.faults.injection.faulty_scanner import (
 )
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
 from afm_scan_bench.faults.injection.trial import MOMENT, PATIENCE, Trial
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.types import Array, Trace
-from afm_scan_ros.nodes.messages import block_message
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE
 
@@ -214,7 +213,7 @@ def _forge(log: "OutputLog") -> None:
     first = int(log.last()[1])
     for start in range(first, first + 5000, 500):
         block = Trace(start, PERIOD, np.full(500, -4.9), np.full(500, -4.9))
-        publisher.publish(block_message(DRIVE.kind, info, block, last=False))
+        publisher.publish(encode_block(DRIVE.type_name, info, block, last=False))
 
 
 def watch() -> None:

@@ -15,10 +15,9 @@ from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import PATIENT, SCAN, Trial, numbered, undisturbed
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.messages import Message, block_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 from afm_scan_ros.report.table import Row
 
@@ -113,10 +112,8 @@ def _publish(trial: Trial, topic: NodeTopic, info: ScanInfo) -> Node:
     publisher = foreign.create_publisher(topic.kind, topic.name, topic.writer)
     trial.until(lambda: publisher.get_subscription_count() > 0)
     samples = np.full(500, 1e-6)
-    message: Message = block_message(
-        topic.kind, info, Trace(0, info.sample_period, samples, samples), last=False
-    )
-    publisher.publish(message)
+    block = Trace(0, info.sample_period, samples, samples)
+    publisher.publish(encode_block(topic.type_name, info, block, last=False))
     return foreign
 
 
