@@ -46,6 +46,7 @@ def bag_of(folder: Path, drive: Trace, moved: Trace, info: ScanInfo) -> Path:
     return folder
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("kind", ["creep", "frequency", "hysteresis", *SWEEPS])
 def test_a_drive_is_recognised_whatever_its_size_and_sign(kind: str) -> None:
     quick = {"frequency": frequency, "hysteresis": partial(hysteresis_plan, levels=13)}

@@ -28,6 +28,7 @@ def in_process(files: ScanFiles, inverses: tuple[str, ...], *, images: bool) -> 
         writer.add("true_displacement", signals.true)
 
 
+@pytest.mark.evidence
 def test_the_demonstration_shows_what_each_inverse_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -217,6 +217,7 @@ def test_residual_is_described_record_by_record(run: Run) -> None:
     assert after["rms_m"] < 0.1 * before["rms_m"]
 
 
+@pytest.mark.evidence
 def test_what_nothing_explains_is_described_and_no_name_given(unexplained: Run) -> None:
     document, message = unexplained.document, unexplained.result.output
     assert unexplained.result.exit_code == 0, message
@@ -371,6 +372,7 @@ def test_model_without_model_discrepancy_is_refused(
     assert "model.yaml: the model of axis x states no model_discrepancy" in message
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(("recorded", "proposed"), [("rest", True), ("amplitudes", False)])
 def test_what_is_recorded_already_is_not_proposed_again(
     tmp_path: Path, recorded: str, *, proposed: bool

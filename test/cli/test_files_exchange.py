@@ -79,6 +79,7 @@ def same(one: Trace, other: Trace) -> None:
     np.testing.assert_array_equal(one.y, other.y)
 
 
+@pytest.mark.evidence
 @pytest.mark.usefixtures("_lab")
 def test_the_record_is_that_of_the_scanner_itself() -> None:
     size = ["--experiment", "broadband", "--amplitude", "1V", "--duration", "0.3s"]

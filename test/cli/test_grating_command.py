@@ -117,6 +117,7 @@ def test_a_pitch_that_is_not_the_grating_s_own_is_refused(pitch: str, tmp_path: 
     assert not (tmp_path / "m.yaml").exists()
 
 
+@pytest.mark.evidence
 def test_a_failure_of_another_image_keeps_the_model(tmp_path: Path) -> None:
     """The image to correct is larger than the one that identified the model."""
     pytest.importorskip("gwyfile")

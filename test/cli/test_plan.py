@@ -28,6 +28,7 @@ def test_drives_are_written_as_text_and_arrays(tmp_path: Path) -> None:
     assert "drive_x=1:V,achieved_x=2:um" in (tmp_path / "out/README.md").read_text()
 
 
+@pytest.mark.evidence
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     arguments = [*OPTIONS, "--export", str(tmp_path)]
     assert CliRunner().invoke(plan, arguments).exit_code == 0

@@ -24,6 +24,8 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import share_directory, survey_files
 from helpers.in_process import ALL, scan
 
+pytestmark = pytest.mark.evidence
+
 MODEL = share_directory() / "config/model.yaml"
 SPEC = ScanSpec(lines=3, samples_per_line=1000, preparation_cycles=5)
 START, DAY = 1_760_000_000 * 10**9, 86_400 * 10**9

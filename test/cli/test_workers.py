@@ -46,6 +46,7 @@ def pid(_: int) -> int:
     return os.getpid()
 
 
+@pytest.mark.evidence
 def test_a_killed_process_costs_no_other_task(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(8)]
     found = dict(outcomes := list(in_processes(work, tasks, 2)))
@@ -86,6 +87,7 @@ def faults(_: int) -> float:
     return (getrusage(RUSAGE_SELF).ru_minflt - before) / pages
 
 
+@pytest.mark.evidence
 @pytest.mark.skipif(libc_ver()[0] != "glibc", reason="another allocator")
 def test_workers_keep_the_memory_of_arrays_that_are_freed() -> None:
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
@@ -97,6 +99,7 @@ def test_workers_keep_the_memory_of_arrays_that_are_freed() -> None:
     assert max(on_dask, here) < 0.1
 
 
+@pytest.mark.evidence
 def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:
     tasks = [(number, str(tmp_path)) for number in range(8)]
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
@@ -110,6 +113,7 @@ def test_a_cluster_loses_nothing_with_a_worker(tmp_path: Path) -> None:
     assert isinstance(error, ValueError)
 
 
+@pytest.mark.evidence
 def test_a_result_that_is_lost_with_its_worker_is_computed_anew() -> None:
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
     with LocalCluster(host="127.0.0.1", silence_logs=50, **options) as cluster:

@@ -28,6 +28,7 @@ def message(cache: Path) -> str:
     return done.stderr
 
 
+@pytest.mark.evidence
 def test_compiling_is_said_once_and_a_warm_cache_is_quiet(tmp_path: Path) -> None:
     assert message(tmp_path) == (
         "afm_scan_ros.core.compiled: compiling loops for this machine, once after installation\n"

@@ -42,6 +42,7 @@ def other_model(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.evidence
 def test_a_model_outlives_whoever_saves_it(tmp_path: Path) -> None:
     path, other = tmp_path / "model.yaml", other_model(tmp_path)
     for trial in range(6):

@@ -156,6 +156,7 @@ def test_a_calibration_record_is_sent_to_identify(tmp_path: Path) -> None:
         analyse(read_scan(tmp_path / "bag"))
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_every_pattern_can_be_drawn(tmp_path: Path, pattern: str) -> None:
     view = view_of(read_scan(record(tmp_path / "bag", pattern)))

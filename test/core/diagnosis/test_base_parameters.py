@@ -176,6 +176,7 @@ def residual(seed: int, size: float, parameters: int = 2) -> LinearResidual:
     return LinearResidual(np.sum(left**2, axis=1) / 10.0, slope / 10.0, gram / 10.0)
 
 
+@pytest.mark.evidence
 @given(seed=SEEDS, size=SIZED)
 def test_the_profile_is_the_best_nearby(seed: int, size: float) -> None:
     """Of the t likelihood, and of something outside: no other deviation is likelier."""

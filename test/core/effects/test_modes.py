@@ -15,6 +15,7 @@ PERIOD = 5e-5
 CHAIN = Chain(paper.axis())
 
 
+@pytest.mark.evidence
 @settings(deadline=None, max_examples=15)
 @given(
     kind=st.sampled_from(["series_mode", "parallel"]),

@@ -9,6 +9,7 @@ from afm_scan_ros.core.identification.drives.excitation import excitation_block,
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import reversal_curves
 
 
+@pytest.mark.evidence
 def test_ramps_too_fast_to_be_distinguished_from_noise_are_refused() -> None:
     plan = hysteresis_plan(levels=6)
     drive = excitation_block(plan, 0, plan.total_samples).x

@@ -63,6 +63,7 @@ def test_a_scanner_too_fast_to_ring_has_no_resonance(seed: int) -> None:
     assert resonance(scans(5e3, 0.02, np.random.default_rng(seed))) is None
 
 
+@pytest.mark.evidence
 def test_a_small_mode_is_not_taken_for_the_scanner_s_own() -> None:
     """It rings as clearly, but a model of it alone would move twenty times as much there."""
     rng = np.random.default_rng(5)

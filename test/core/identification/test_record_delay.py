@@ -36,6 +36,7 @@ def response(delay: float, seed: int = 0, noise: float = 1e-4) -> FrequencyRespo
     return FrequencyResponse(OMEGA, noisy, scatter, scatter, np.ones(len(OMEGA)))
 
 
+@pytest.mark.evidence
 @settings(deadline=None, max_examples=4)
 @given(delay=st.floats(-5e-5, 3e-3), seed=st.integers(0, 9))
 def test_delay_is_found_within_a_microsecond(delay: float, seed: int) -> None:

@@ -54,6 +54,7 @@ def errors(found: Positions, sides: tuple[Array, Array]) -> Array:
     return (seen - seen.mean(axis=0) - true + true.mean(axis=0)) / PIXEL
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("seed", range(2))
 def test_a_known_motion_is_found(seed: int) -> None:
     draw = np.random.default_rng(seed).uniform
@@ -91,6 +92,7 @@ def ringing(periods: float, damping: float) -> tuple[Array, Array]:
     return trace, retrace
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("periods", [9.3, 25.4])
 def test_a_ripple_is_followed(periods: float) -> None:
     """Ripples of a quarter and a tenth of a cell, in which no smooth motion settles."""
@@ -133,6 +135,7 @@ def test_a_mode_behind_a_triangle_rings_as_simulated() -> None:
     assert np.abs(left).max() < 0.1 * np.abs(rings).max()
 
 
+@pytest.mark.evidence
 def test_a_tilted_sample_moves_nothing() -> None:
     """The tilt times the place is no parabola of the pixel where the scanner is not linear."""
     sides = motion(0.1, 0.05, 1.0)
@@ -193,6 +196,7 @@ def test_lines_before_the_first_edges_are_left_out(angle: float, fewest: int, mo
     assert SIZE - 3 <= down.known.stop < SIZE
 
 
+@pytest.mark.evidence
 def test_trace_and_retrace_that_do_not_meet_are_refused() -> None:
     """They are a cell apart at one turn, and meet at the other."""
     trace, retrace = motion(0.0, 0.0, 1.0)
@@ -210,6 +214,7 @@ def test_lines_and_noise_are_refused() -> None:
             register(ScanImage(heights, heights, RANGE, RANGE, 1.0), PITCH)
 
 
+@pytest.mark.evidence
 def test_the_model_follows_the_loop() -> None:
     sides = motion(0.2, 0.0, 0.9)
     image = image_of(sides, 0.05, 1e-9, 2)

@@ -48,6 +48,7 @@ def positions_at(line_time: float) -> Positions:
     return Positions(sides[0], sides[1], uncertainty)
 
 
+@pytest.mark.evidence
 def test_a_second_rate_shows_the_resonance() -> None:
     times = (1.0, 0.1)
     images, found = [image_at(t) for t in times], [positions_at(t) for t in times]
@@ -59,6 +60,7 @@ def test_a_second_rate_shows_the_resonance() -> None:
     assert axis.effects.hysteresis.frequencies == pytest.approx((1.0, 10.0))
 
 
+@pytest.mark.evidence
 def test_the_angle_of_the_fastest_image_is_shared_by_both_axes() -> None:
     """The slow image also drifts; half of what is left of the angle is in each axis."""
     times, angles = (1.0, 0.1), (0.05, 0.02)

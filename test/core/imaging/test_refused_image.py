@@ -14,6 +14,8 @@ from afm_scan_ros.core.imaging.grating.registered_image import (
 )
 from afm_scan_ros.report.grating import grating_table
 
+pytestmark = pytest.mark.evidence
+
 PITCH = 6e-6
 """m, along the turned coordinates."""
 

@@ -40,6 +40,7 @@ def shifted(frequency: float, damping: float) -> Array:
     return before / (1.0 - moved**2 + 2j * damping * ratio * moved)
 
 
+@pytest.mark.evidence
 @given(st.integers(0, 999), st.sampled_from([0.93, 1.0, 1.06]))
 def test_a_moved_resonance_is_found_with_its_variance(seed: int, factor: float) -> None:
     rng = np.random.default_rng(seed)

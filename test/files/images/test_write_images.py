@@ -95,6 +95,7 @@ def test_an_image_comes_back_from_simple_fields(seed: int, lines: int, pixels: i
     assert found.retrace is None
 
 
+@pytest.mark.evidence
 @settings(deadline=None, max_examples=20)
 @given(**SIZES)
 def test_variables_of_netcdf(seed: int, lines: int, pixels: int) -> None:
