@@ -12,6 +12,8 @@ from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases
 
+pytestmark = pytest.mark.long
+
 SPEC = """\
 /**/trajectory_generator:
   ros__parameters:

@@ -22,6 +22,8 @@ from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant
 from helpers.ros import PATIENCE, joined, until
 
+pytestmark = pytest.mark.long
+
 EVIDENCE = pytest.mark.evidence
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4000, window=4000, nodes=("source",))
 NAME = "piezoscanner_sim"

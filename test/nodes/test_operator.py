@@ -27,6 +27,8 @@ from afm_scan_ros.files.plant_file import save_scan
 from helpers.in_process import default_plant, drive_through
 from helpers.stage import stage
 
+pytestmark = pytest.mark.long
+
 PATIENCE = 60.0
 AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
 

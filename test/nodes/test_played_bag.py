@@ -22,6 +22,8 @@ from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor
 from helpers.in_process import SPEC, scan
 from helpers.ros import PATIENCE, joined, publisher, until
 
+pytestmark = pytest.mark.long
+
 READERS = ("tracking_monitor", "scan_imager", "residual_monitor")
 SILENCE = 1.0
 """Seconds that a node of a scan may be silent."""

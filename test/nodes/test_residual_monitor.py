@@ -18,6 +18,8 @@ from afm_scan_ros.nodes.residual_monitor import ResidualMonitor
 from afm_scan_ros.nodes.topics import MODEL_RESIDUAL, NODE_STATE
 from helpers.ros import PATIENCE, joined, until
 
+pytestmark = pytest.mark.long
+
 LINES = 6
 PACE = {"real_time": False}
 """Parameters of every node of a scan that no clock paces."""

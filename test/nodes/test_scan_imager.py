@@ -15,6 +15,8 @@ from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import RETRACE_IMAGE, TRACE_IMAGE
 from helpers.ros import PATIENCE, joined, until
 
+pytestmark = pytest.mark.long
+
 PIXELS = 100
 CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_imager")
 SPEC = ScanSpec(range_x=10e-6, range_y=10e-6, line_rate=20.0, lines=6, samples_per_line=1000)

@@ -16,6 +16,8 @@ from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import NODE_STATE
 from helpers.ros import PATIENCE, joined, until
 
+pytestmark = pytest.mark.long
+
 SOURCE = "trajectory_generator"
 HELPERS = Path(__file__).parents[1] / "helpers"
 CONSUMERS = ("inversion_compensator", "piezoscanner_sim", "scan_recorder")

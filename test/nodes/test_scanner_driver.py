@@ -24,6 +24,8 @@ from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant, drive_through
 from helpers.ni_twin import settings_file, twin
 
+pytestmark = pytest.mark.long
+
 PATIENCE = 60.0
 SETTINGS = """\
 amplifier: {{voltage_limit_v: 5.0, slew_limit_v_per_s: 2.0e5, ramp_down_slew_v_per_s: 40.0}}

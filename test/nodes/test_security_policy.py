@@ -24,6 +24,8 @@ from afm_scan_ros.nodes.topics import (
     TRACKING_ERROR,
 )
 
+pytestmark = pytest.mark.long
+
 CONFIG = share_directory() / "config"
 POLICY = CONFIG / "sros2" / "policy.xml"
 INCLUDE = "{http://www.w3.org/2001/XInclude}include"

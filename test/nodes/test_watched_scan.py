@@ -10,6 +10,8 @@ from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 
+pytestmark = pytest.mark.long
+
 LINES = 6
 NAME = "residual_monitor"
 
