@@ -213,7 +213,7 @@ def test_a_fault_ends_the_scan_by_name_with_outputs_at_rest(
     sensor = VOLTS if driver == "Clipped" else WIDE
     given = files(spec, tmp_path / "bag", f"faulty:{driver}:{settings(sensor)}")
     with pytest.raises(
-        ScanError, match=rf"scanner_driver: .*{said}.*; drive ramped down to 0 V"
+        ScanError, match=rf"scanner_driver(:| failed:) .*{said}.*; drive ramped down to 0 V"
     ) as raised:
         run_scan(given, ("none",), 0.0)
     log = tmp_path / "bag.failed/traceback.log"
