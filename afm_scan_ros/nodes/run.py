@@ -152,7 +152,7 @@ def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
     if not node.take_messages(IDLE):
         node.all_heard()
         node.await_message(wait)
-    if node.services_are_due():
+    if node.watch_is_due:
         executor.spin_once(timeout_sec=0.0)
 
 

@@ -26,11 +26,9 @@ from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE, NodeTopic
 HEARTBEAT = 0.05
 """Seconds between two states of a node."""
 WATCH = 0.02
-"""Seconds between two looks at the other nodes."""
+"""Seconds between two looks at the other nodes, and at requests of services."""
 SILENCE_AT_REST = 5.0
 """Silence (s) of the source after which a node no longer waits for its scan: nothing moves yet."""
-SERVICE = 0.02
-"""Longest time, s, for which a request of a service waits."""
 INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
@@ -86,7 +84,6 @@ class ScanNode(Node, ABC):
         self._reported = 0
         self._logged = ""
         self._next_watch = self._started = self._ticked = self._advanced = time.monotonic()
-        self._next_service = self._started
         self._all_heard_at = self._started
         self.calls = 0
         self.busy = 0.0
@@ -127,6 +124,11 @@ class ScanNode(Node, ABC):
     def leaving(self) -> bool:
         """Whether the node has ended its work, for better or worse."""
         return self._leave_at is not None
+
+    @property
+    def watch_is_due(self) -> bool:
+        """Whether the next tick looks at the other nodes."""
+        return time.monotonic() >= self._next_watch
 
     @abstractmethod
     def step(self) -> bool:
@@ -170,7 +172,7 @@ class ScanNode(Node, ABC):
         """Call back for messages that have arrived, for so long at most; return whether any had.
 
         An executor builds its set of waitables anew for each message, which takes several times as
-        long as the message. What is waited for and taken here is so as in rclpy.wait_for_message.
+        long as the message. Waiting and taking follow ``rclpy.wait_for_message``.
         """
         deadline, before = time.monotonic() + seconds, self.calls
         busy = True
@@ -194,14 +196,6 @@ class ScanNode(Node, ABC):
         for subscription, _ in self._readers:
             waits.add_subscription(subscription.handle)
         waits.wait(timeout_sec_to_nsec(seconds))
-
-    def services_are_due(self) -> bool:
-        """Return whether services have waited for SERVICE; they have to, now."""
-        now = time.monotonic()
-        due = now >= self._next_service
-        if due:
-            self._next_service = now + SERVICE
-        return due
 
     def all_heard(self) -> None:
         """Note that no message that has arrived waits to be heard."""

@@ -49,8 +49,10 @@ class TrackingMonitor(StreamReader):
                 self._viewers.publish(monitor_message(self.scan, sample))
 
     def _hear_drive(self, cdr: bytes, _: int) -> None:
+        if self.info is None or self.leaving:
+            return
         block = decode_block(DRIVE.type_name, cdr)
-        if self.info is None or self.leaving or block.scan_id != self.info.scan_id:
+        if block.scan_id != self.info.scan_id:
             return
         while self.prepares():
             pass
