@@ -79,6 +79,8 @@ LOCAL = "DEFAULT_FASTRTPS_PROFILES.xml"
 
 SEGMENT = 32 * 2**20
 """Bytes of shared memory of a participant; config/fastdds.xml argues this and what follows."""
+CHECK = 150.0
+"""Longest check, ms, whether a participant listens, during which nothing is published."""
 HEARTBEAT = 0.1
 """Longest heartbeat, s: a lost block has to come again within the scan's window of 0.4 s."""
 REPEAT = 0.1
@@ -133,18 +135,23 @@ def _lacks_memory(root: ET.Element, environment: Mapping[str, str]) -> Iterator[
     if participant is not None:
         used = [_text(each) for each in participant.iterfind("rtps/userTransports/transport_id")]
         builtin = _text(participant.find("rtps/useBuiltinTransports")) not in ("false", "0")
-    sizes = [
-        _number(each.find("segment_size"))
+    memories = (
+        each
         for each in root.iter("transport_descriptor")
         if _text(each.find("type")) == "SHM" and _text(each.find("transport_id")) in used
-    ]
+    )
     added = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
-    if sizes and sizes[0] < SEGMENT:
-        yield f"segment_size is {sizes[0]:.0f}: give at least {SEGMENT}"
-    elif not sizes and (builtin or added):
+    if (memory := next(memories, None)) is not None:
+        if (size := _number(memory.find("segment_size"))) < SEGMENT:
+            yield f"segment_size is {size:.0f}: give at least {SEGMENT}"
+        check = memory.find("healthy_check_timeout_ms")
+        if (longest := 1000.0 if check is None else _number(check)) > CHECK:
+            yield f"healthy_check_timeout_ms is {longest:.0f}: give at most {CHECK:.0f}"
+    elif builtin or added:
         yield (
             "the default participant names no transport of type SHM in userTransports: name one"
-            f" with segment_size of at least {SEGMENT}"
+            f" with segment_size of at least {SEGMENT} and healthy_check_timeout_ms of at most"
+            f" {CHECK:.0f}"
         )
 
 

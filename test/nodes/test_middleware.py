@@ -47,6 +47,7 @@ class Profile:
     """A user's profile; None is what it does not state."""
 
     segment: int | None
+    check_ms: int | None
     heartbeat_ns: int | None
     pause_ns: int | None
     kept: int | None
@@ -55,6 +56,7 @@ class Profile:
 
     def text(self) -> str:
         size = _tag("segment_size", self.segment)
+        size += _tag("healthy_check_timeout_ms", self.check_ms)
         shm = f"<transport_id>m</transport_id><type>SHM</type>{size}"
         default = f'profile_name="mine" is_default_profile="{self.default}"'
         period = _duration("heartbeatPeriod", self.heartbeat_ns)
@@ -76,6 +78,7 @@ class Profile:
         kept = 5000 if self.kept is None else self.kept
         return {
             *({"segment_size"} if (self.segment or 0) < 32 * 1024**2 else ()),
+            *({"healthy_check_timeout_ms"} if self.check_ms is None or self.check_ms > 150 else ()),
             *({"heartbeatPeriod"} if self.heartbeat_ns is None or self.heartbeat_ns > 1e8 else ()),
             *({"nackSupressionDuration"} if (self.pause_ns or 0) < 1e8 else ()),
             *({"max_samples"} if 0 < kept < 15_000 else ()),
@@ -97,6 +100,7 @@ NANOSECONDS = st.none() | st.integers(0, 4 * 10**9) | st.sampled_from([10**8 - 1
 PROFILE = st.builds(
     Profile,
     segment=st.none() | st.integers(0, 2**27) | st.sampled_from([SEGMENT - 1, SEGMENT]),
+    check_ms=st.none() | st.integers(0, 2000) | st.sampled_from([150, 151]),
     heartbeat_ns=NANOSECONDS,
     pause_ns=NANOSECONDS,
     kept=st.none() | st.integers(-1, 40_000) | st.sampled_from([KEPT - 1, KEPT]),
@@ -113,7 +117,7 @@ def test_each_thing_that_a_users_profile_lacks_is_named_once(profile: Profile) -
         said = lacking(file, {})
     assert all(sentence.startswith(f"{file}: ") for sentence in said)
     words = ["segment_size is", "userTransports", "no data_writer", "heartbeatPeriod is"]
-    words += ["nackSupressionDuration is", "max_samples is"]
+    words += ["nackSupressionDuration is", "max_samples is", "healthy_check_timeout_ms is"]
     found = [word for sentence in said for word in words if word in sentence]
     assert len(found) == len(said)
     assert {word.removesuffix(" is").removeprefix("no ") for word in found} == profile.lacks()
