@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples, whole
 from afm_scan_ros.api.model import UNLIMITED, Model
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.loop import LearningScan, best_of
@@ -119,8 +119,7 @@ class _Measured:
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction) -> Scan:
         """Scan with all of a model's inverses."""
         period = spec.sample_period
-        settings = InverseSettings(preview=preview_of(model, period))
-        compensation = Compensation(model, period, INVERSES, settings, self.limits)
+        compensation = Compensation(model, period, INVERSES, InverseSettings(), self.limits)
         drive = compensation.whole(correction.reference())
         self.progress(f"{label}: {len(drive.x)} samples")
         measured = samples("measure", self.measure(np.column_stack([drive.x, drive.y])))

@@ -16,13 +16,14 @@ from afm_scan_ros.api.arguments import (
     channels_of,
     of_type,
     period_of,
+    positive,
     refuse_other_count,
     samples,
     trace_of,
 )
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
+from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
@@ -144,6 +145,7 @@ class Model:
         sample_period: float,
         effects: Iterable[str] | None = None,
         limits: DriveLimits | None = None,
+        weight: float | None = None,
         *,
         periodic: bool = False,
     ) -> Array:
@@ -156,6 +158,8 @@ class Model:
                 other one counts by its gain at rest, and so does each that is unknown; a warning in
                 the log names these.
             limits: the amplifier's voltage and slew; none where None.
+            weight: frequency (Hz) above which the inverse of vibration prefers a small drive to a
+                small error; 11 times the first resonance of each axis where None.
             periodic: of coupled axes, whether ``desired`` is whole periods, in steady state.
 
         The inverse of coupled axes is that of the whole model in the band that was identified.
@@ -167,8 +171,9 @@ class Model:
         if not isinstance(self._scanner, ScannerModel):
             from afm_scan_ros.api import coupled  # noqa: PLC0415 - see predict
 
-            if effects is not None:
-                raise InputError("effects: a model of coupled axes inverts all: leave them out")
+            for name, value in {"effects": effects, "weight": weight}.items():
+                if value is not None:
+                    raise InputError(f"{name}: a model of coupled axes inverts all: leave it out")
             return coupled.inverted(
                 self._scanner, desired, sample_period, limits, periodic=periodic
             )
@@ -178,11 +183,15 @@ class Model:
         names = "a list of effects, as ['creep']"
         chosen = INVERSES if effects is None else all_of_type(str, "effects", effects, names)
         settings = InverseSettings()
-        if "vibration" in chosen:
-            ahead = preview_of(self.scanner, target.sample_period, DEFAULT_PREVIEW)
-            settings = evolve(settings, preview=ahead)
+        if weight is not None:
+            corner = positive("weight", weight, "in Hz, as 5e3")
+            settings = evolve(settings, weight=SmoothWeight(corner, RelativeWeight().order))
         inverse = Compensation(
-            self.scanner, target.sample_period, chosen, settings, limits or UNLIMITED
+            self.scanner,
+            target.sample_period,
+            chosen,
+            settings,
+            limits or UNLIMITED,
         )
         return self._like(desired, inverse.whole(target))
 

@@ -18,7 +18,6 @@ from afm_scan_ros.cli.scan import drive_limits_of, run_scan
 from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
-from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.diagnosis.records import Observation
@@ -92,13 +91,9 @@ class RecordedSession:
             save_learned(learned, correction, model)
         model_file = self._model_file(model)
         files = ScanFiles(spec_file, model_file, self.plant, bag, self.scanner, learned)
-        preview_ms = 1e3 * preview_of(model, spec.sample_period)
-        further: dict[str, dict[str, object]] = {
-            "piezoscanner_sim": (
-                {"seed": self._next_seed(), "age_s": self._age} if self.scanner == SIM else {}
-            ),
-            "inversion_compensator": {"preview_ms": preview_ms},
-        }
+        further: dict[str, dict[str, object]] = {}
+        if self.scanner == SIM:
+            further["piezoscanner_sim"] = {"seed": self._next_seed(), "age_s": self._age}
         run_scan(files, INVERSES, self.time_scale, further)
         recording = read_scan(bag)
         names = [*SIGNALS, TRUE] if TRUE in recording.topics else SIGNALS

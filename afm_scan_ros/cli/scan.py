@@ -31,8 +31,6 @@ from afm_scan_ros.cli.scanner import (
     time_scale_option,
 )
 from afm_scan_ros.cli.ways import scan_as_ordered
-from afm_scan_ros.core.compensation import preview_of
-from afm_scan_ros.core.effects.vibration import DEFAULT_PREVIEW
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.adapted_scan import refuse_without_turns
 from afm_scan_ros.core.learning.correction import Correction
@@ -89,7 +87,7 @@ def run_scan(
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
-    own = _own(files, scanner, model, spec, inverses, corrected)
+    own = _own(files, scanner, corrected)
     every = {part: {**own.get(part, {}), **further.get(part, {})} for part in {*own, *further}}
     order = ScanOrder(
         files, spec, flow, model, inverses, scanner, time_scale, every, images, watched
@@ -128,22 +126,12 @@ def _correction(
 def _own(
     files: ScanFiles,
     scanner: ScannerChoice,
-    model: ScannerModel,
-    spec: ScanSpec,
-    inverses: Sequence[str],
     corrected: Mapping[str, bool],
 ) -> dict[str, Parameters]:
     """Parameters of the compensator and the monitor, before those of their files."""
     learned = {"learned_file": str(files.learned)} if files.learned else {}
-    ahead = _looking_ahead(model, spec) if "vibration" in inverses else {}
-    own = {**learned, **corrected, **_tighter_limits(scanner), **ahead}
+    own = {**learned, **corrected, **_tighter_limits(scanner)}
     return {COMPENSATOR: own, MONITOR: {"adapt": corrected["adapt"]}}
-
-
-def _looking_ahead(model: ScannerModel, spec: ScanSpec) -> Parameters:
-    """Preview that a model needs beyond the default, or nothing: of a file, the user sets it."""
-    needed = preview_of(model, spec.sample_period, DEFAULT_PREVIEW)
-    return {"preview_ms": 1e3 * needed} if needed > DEFAULT_PREVIEW else {}
 
 
 def _tighter_limits(scanner: ScannerChoice) -> Parameters:

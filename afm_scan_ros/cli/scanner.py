@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
@@ -56,9 +56,8 @@ def scan_by_files(
 ) -> None:
     """Record one scan in a bag, with a change of its reference."""
     inverses = tuple(sorted(inverses))
-    settings = InverseSettings(preview=preview_of(model, spec.sample_period))
     limits = exchange.settings.amplifier.limits
-    compensation = Compensation(model, spec.sample_period, inverses, settings, limits)
+    compensation = Compensation(model, spec.sample_period, inverses, InverseSettings(), limits)
     drive = compensation.whole(correction.reference())
     target = desired(spec, 0, total_samples(spec))
     info = evolve(

@@ -14,7 +14,7 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, OutputMap
-from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AS_IDENTIFIED,
@@ -146,7 +146,7 @@ class Chain:
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
         """Return the vibration whose inverse is designed by the ``settings``."""
-        design = evolve(settings.design(), before=self.before)
+        design = InverseDesign(settings.weight, settings.preview, self.before)
         return Vibration(self.model.vibration, sample_period, design)
 
     def hysteresis_of(self, operator: HysteresisOperator) -> Element[AnyEffect]:

@@ -8,13 +8,13 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
-from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration
+from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import SampleError, ScanError
 from afm_scan_ros.core.learning.correction import Correction, Stop
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import SMALLEST_RANGE, ScanSpec
-from afm_scan_ros.core.scanner import Coupling, InverseState, chain_of, compensator
+from afm_scan_ros.core.scanner import Coupling, InverseState, compensator
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -209,23 +209,6 @@ def _common(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
 def _after(count: int, samples: Array) -> Array:
     """Return the samples after so many, which keeps nothing of those before."""
     return samples[count:].copy() if len(samples) > count else NOTHING
-
-
-LEAST_PREVIEW = 0.03
-"""Seconds that the inverses of a closed loop look ahead at least."""
-
-
-def preview_of(model: ScannerModel, sample_period: float, least: float = LEAST_PREVIEW) -> float:
-    """Preview (s) that the inverses of all axes need, at least ``least``.
-
-    A lightly damped mode needs a long preview. Raises InputError where a response does not decay,
-    or for an added effect that cannot be inverted.
-    """
-    settings = InverseSettings()
-    chains = (chain_of(model.axis(name)) for name in model.axes)
-    inverses = (chain.vibration(sample_period, settings).inverse for chain in chains)
-    samples = max(inverse.kernel.preview_needed(LARGEST_TAIL) for inverse in inverses)
-    return max(least, samples * sample_period)
 
 
 BLOCK = 5000

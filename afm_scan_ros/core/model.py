@@ -16,7 +16,8 @@ from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, field, fields, frozen
-from attrs.validators import ge, gt, in_
+from attrs.converters import optional as optional_converter
+from attrs.validators import ge, in_, optional
 
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.effects.base import AnyEffect
@@ -24,13 +25,8 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
-from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
-from afm_scan_ros.core.effects.vibration import (
-    DEFAULT_PREVIEW,
-    DEFAULT_WEIGHT,
-    InverseDesign,
-    VibrationModel,
-)
+from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, Weight
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, floats
 
@@ -307,15 +303,18 @@ class ScannerModel:
 
 @frozen
 class InverseSettings:
-    """How to invert: kind of hysteresis inverse, weight of the optimal inverse, preview (s)."""
+    """How to invert.
+
+    Attributes:
+        hysteresis_inverse: "exact", "direct" (Croft et al. 2001) or the one that the model names.
+        weight: of the optimal inverse of vibration: what a large drive costs over an error.
+        preview: how far (s) that inverse looks ahead; as far as its response needs where None.
+    """
 
     hysteresis_inverse: str = field(
         default=AS_IDENTIFIED, validator=in_((AS_IDENTIFIED, EXACT, DIRECT))
     )
-    weight_corner: float = field(default=DEFAULT_WEIGHT.corner, converter=float, validator=gt(0.0))
-    weight_order: int = field(default=DEFAULT_WEIGHT.order, validator=ge(1))
-    preview: float = field(default=DEFAULT_PREVIEW, converter=float, validator=ge(0.0))
-
-    def design(self) -> InverseDesign:
-        """What the vibration inverse needs of these."""
-        return InverseDesign(SmoothWeight(self.weight_corner, self.weight_order), self.preview)
+    weight: Weight | RelativeWeight = field(factory=RelativeWeight)
+    preview: float | None = field(
+        default=None, converter=optional_converter(float), validator=optional(ge(0.0))
+    )

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 from attrs import Attribute, frozen
 
 from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
+from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.learning import TIME_CONSTANT
 from afm_scan_ros.core.learning.line_feedback import LEAD
@@ -57,7 +58,7 @@ ADAPTATION = (
 )
 
 
-_DEFAULT = InverseSettings()
+_DEFAULT, _WEIGHT = InverseSettings(), RelativeWeight()
 INVERSION = (
     NodeParameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
     NodeParameter(
@@ -68,15 +69,18 @@ INVERSION = (
     ),
     NodeParameter(
         "weight_corner_hz",
-        _DEFAULT.weight_corner,
-        "Frequency above which the inverse limits the drive",
-        low=1.0,
+        0.0,
+        f"Frequency above which the inverse limits the drive; 0 for {_WEIGHT.corner:g}"
+        " times the first resonance",
+        low=0.0,
     ),
+    NodeParameter("weight_order", _WEIGHT.order, "Steepness of that transition", low=1, high=10),
     NodeParameter(
-        "weight_order", _DEFAULT.weight_order, "Steepness of that transition", low=1, high=10
-    ),
-    NodeParameter(
-        "preview_ms", _DEFAULT.preview * 1e3, "Preview of the inverse", low=0.0, high=1000.0
+        "preview_ms",
+        0.0,
+        "Preview of the inverse; 0 for as long as its response needs",
+        low=0.0,
+        high=1000.0,
     ),
     *DRIVE_LIMITS,
     NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
@@ -130,15 +134,18 @@ def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
         drive_limits(given),
         InverseSettings(
             hysteresis_inverse=given["hysteresis_inverse"],
-            weight_corner=given["weight_corner_hz"],
-            weight_order=given["weight_order"],
-            preview=given["preview_ms"] * 1e-3,
+            weight=_weight(given["weight_corner_hz"], given["weight_order"]),
+            preview=given["preview_ms"] * 1e-3 or None,
         ),
         line_feedback=given["line_feedback"],
         adapt=given["adapt"],
         latency=given["feedback_latency_ms"] * 1e-3,
         time_constant=given["adapt_time_constant_s"],
     )
+
+
+def _weight(corner: float, order: int) -> Weight | RelativeWeight:
+    return SmoothWeight(corner, order) if corner else RelativeWeight(order=order)
 
 
 def simulated_scanner(settings: Mapping[str, Any], where: str) -> DriverChoice:

@@ -4,7 +4,6 @@ from attrs import define, field
 
 from afm_scan_bench.in_process import drive_through
 from afm_scan_bench.scans import ALL, SEED, scan
-from afm_scan_ros.core.compensation import preview_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
@@ -24,8 +23,7 @@ class InProcessSession:
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:  # noqa: ARG002 - for those who keep files
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
-        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
-        return scan(spec, ALL, settings, self.plant, model, seed=self._next_seed())
+        return scan(spec, ALL, InverseSettings(), self.plant, model, seed=self._next_seed())
 
     def experiment(self, plan: Plan[Waveform]) -> Observation:
         """Drive the scanner through an experiment, which the plan is named after."""

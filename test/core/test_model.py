@@ -72,9 +72,7 @@ def test_an_unknown_inverse_is_refused_by_name(axis: AxisModel) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"weight_order": 0},
         {"hysteresis_inverse": "best"},
-        {"weight_corner": 0.0},
         {"preview": -1.0},
     ],
     ids=str,

@@ -5,7 +5,7 @@ from functools import cache
 
 from attrs import define, field
 
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
@@ -85,9 +85,8 @@ class InProcessSession:
         correction: Correction | None = None,
     ) -> Scan:
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
-        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
         seed = self._next_seed()
-        return scan(spec, ALL, settings, self.plant, model, seed, correction)
+        return scan(spec, ALL, InverseSettings(), self.plant, model, seed, correction)
 
     def experiment(self, plan: Plan[Waveform]) -> Observation:
         """Drive the scanner through an experiment, which the plan is named after."""

@@ -41,17 +41,17 @@ from afm_scan_ros.core.effects.residual_features import (
     likely_modes,
 )
 from afm_scan_ros.core.effects.resonance import (
-    DAMPED,
     first_resonance,
     multiplied,
     resonant,
     with_vibration,
 )
+from afm_scan_ros.core.effects.vibration import OSCILLATES
 from afm_scan_ros.core.types import Array
 
 FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0, excited=True)
 DAMPING = EffectParameter("damping", "1", 1e-3, 0.2, 1e-5, neutral=0.02)
-RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=DAMPED))
+RINGING = (EffectParameter("period", "s", 0.0, 0.05, 1e-8), evolve(DAMPING, upper=OSCILLATES))
 TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200))
 """s, as a ringing drive's period over 2π."""
 LIKELY = tuple(

@@ -10,9 +10,6 @@ from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
 
-DAMPED = 0.5
-"""Damping from which on a pair of poles is no resonance."""
-
 
 def resonant(omega: float, damping: float) -> Array:
     """Return s² + 2 damping omega s + omega², omega in rad/s."""
@@ -55,18 +52,9 @@ class Resonance:
 
 
 def first_resonance(vibration: VibrationModel) -> Resonance:
-    """Return the resonance that rises highest: the stage's own.
-
-    A light structure on it, or a broad pair of poles, may lie lower in frequency. Raises InputError
-    where there is none.
-    """
-    numerator, denominator = vibration.numerator, vibration.denominator
-    poles = np.roots(denominator)
-    poles = poles[(poles.imag > 0.0) & (-poles.real < DAMPED * np.abs(poles))]
-    if not poles.size:
+    """Return the resonance that rises highest; raises InputError where there is none."""
+    if (pole := vibration.resonant_pole) is None:
         raise InputError("the vibration model has no resonance: leave out effects that act on one")
-    residues = np.polyval(numerator, poles) / np.polyval(np.polyder(denominator), poles)
-    pole = poles[np.abs(residues / poles.real).argmax()]
-    omega, damping = float(np.abs(pole)), float(-pole.real / np.abs(pole))
-    rest = np.polydiv(denominator, resonant(omega, damping))[0]
+    omega, damping = abs(pole), -pole.real / abs(pole)
+    rest = np.polydiv(vibration.denominator, resonant(omega, damping))[0]
     return Resonance(omega, damping, rest)

@@ -16,9 +16,10 @@ from scipy.linalg import companion, expm
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.optimal_inverse import (
+    Kernel,
     MultipliedWeight,
     OptimalInverse,
-    SmoothWeight,
+    RelativeWeight,
     Weight,
     optimal_kernel,
 )
@@ -27,6 +28,8 @@ from afm_scan_ros.core.types import Array, floats
 
 LONGEST_DELAY = 1.0
 """Seconds."""
+OSCILLATES = 0.5
+"""Damping from which on a pair of poles is no resonance."""
 
 
 @frozen
@@ -69,22 +72,46 @@ class VibrationModel:
         late: NDArray[np.complex128] = np.exp(-s * self.delay)
         return result * late
 
+    @cached_property
+    def resonant_pole(self) -> complex | None:
+        """Pole (rad/s) of the resonance that rises highest, None where there is no resonance.
+
+        It is the stage's own: a light structure on it, or a broad pair of poles, may lie lower in
+        frequency.
+        """
+        poles = np.roots(self.denominator)
+        poles = poles[(poles.imag > 0.0) & (-poles.real < OSCILLATES * np.abs(poles))]
+        if not poles.size:
+            return None
+        residues = np.polyval(self.numerator, poles) / np.polyval(
+            np.polyder(self.denominator), poles
+        )
+        return complex(poles[np.abs(residues / poles.real).argmax()])
+
+    @property
+    def bandwidth(self) -> float:
+        """Frequency (Hz) of the resonance that rises highest, or else of the slowest pole."""
+        pole = self.resonant_pole
+        slowest = np.abs(np.roots(self.denominator)).min() if pole is None else abs(pole)
+        return float(slowest / (2.0 * np.pi))
+
 
 LARGEST_TAIL = 1e-4
-"""Share of the inverse's response that a stream may miss ahead of its preview."""
-DEFAULT_WEIGHT = SmoothWeight(corner=5000.0, order=2)
-DEFAULT_PREVIEW = 20e-3  # s
+"""Share of the inverse's response that may lie ahead of the preview."""
+PERIODS = 9.0
+"""Of the first resonance, that a preview lasts at least: nothing of the response of a well damped
+scanner lies ahead of it, 1e-11 on the default plant."""
 
 
 @frozen
 class InverseDesign:
-    """How to invert: weight and preview (s).
+    """How to invert: weight, and preview (s), which is as long as the inverse needs where None.
 
     ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
     """
 
-    weight: Weight = DEFAULT_WEIGHT
-    preview: float = DEFAULT_PREVIEW
+    weight: Weight | RelativeWeight = field(factory=RelativeWeight)
+    preview: float | None = None
     before: VibrationModel | None = None
 
 
@@ -168,18 +195,43 @@ class Vibration:
         self, model: VibrationModel, sample_period: float, design: InverseDesign | None = None
     ) -> None:
         self._system = held(model, sample_period)
-        self._sample_period = sample_period
+        self._model, self._sample_period = model, sample_period
         self._design = design or InverseDesign()
 
     @cached_property
     def inverse(self) -> OptimalInverse:
-        """The optimal inverse; raises InputError where its response does not die out."""
-        response, weight = self._system.response, self._design.weight
-        if self._design.before is not None:
-            before = held(self._design.before, self._sample_period).response
-            weight = MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
-        kernel = optimal_kernel(response, weight, self._sample_period)
-        return OptimalInverse(kernel, round(self._design.preview / self._sample_period))
+        """The optimal inverse by the design.
+
+        Raises InputError where its response does not die out, or where the design's preview cuts
+        off what the inverse needs of the targets ahead.
+        """
+        kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
+        return OptimalInverse(kernel, self._preview(kernel, self._design.preview))
+
+    def _weight(self) -> Weight:
+        weight, chosen_for = self._design.weight, self._design.before or self._model
+        if isinstance(weight, RelativeWeight):
+            weight = weight.at(chosen_for.bandwidth)
+        if self._design.before is None:
+            return weight
+        response, before = self._system.response, held(chosen_for, self._sample_period).response
+        return MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
+
+    def _preview(self, kernel: Kernel, given: float | None) -> int:
+        """Return the preview, samples; refuse one (s) that is too short."""
+        if given is None:
+            least = round(PERIODS / (self._model.bandwidth * self._sample_period))
+            return max(least, kernel.preview_needed(LARGEST_TAIL))
+        preview = round(given / self._sample_period)
+        if (tail := kernel.tail_ahead(preview)) > LARGEST_TAIL:
+            needed = kernel.preview_needed(LARGEST_TAIL) * self._sample_period
+            raise InputError(
+                f"a preview of {preview} samples, {1e3 * given:g} ms, cuts off"
+                f" {tail:.2g} of the inverse vibration's response at"
+                f" {1.0 / self._sample_period:g} Hz: give at least {1e3 * needed:.3g} ms, or"
+                " another sample rate"
+            )
+        return preview
 
     def at_rest(self) -> Array:
         """State at rest at zero, shape (n + delay,)."""
@@ -194,20 +246,7 @@ class Vibration:
         return np.concatenate((inner, inputs[len(block) :])), result
 
     def inverse_at_rest(self) -> Array:
-        """State of the inverse before sample 0: every earlier target was zero.
-
-        Raises InputError where the preview cuts off what the inverse needs of the targets ahead.
-        """
-        kernel, preview = self.inverse.kernel, self.inverse.preview
-        tail = kernel.tail_ahead(preview)
-        if tail > LARGEST_TAIL:
-            needed = kernel.preview_needed(LARGEST_TAIL) * self._sample_period
-            raise InputError(
-                f"a preview of {preview} samples, {1e3 * self._design.preview:g} ms, cuts off"
-                f" {tail:.2g} of the inverse vibration's response at"
-                f" {1.0 / self._sample_period:g} Hz: give at least {1e3 * needed:.3g} ms, or"
-                " another sample rate"
-            )
+        """State of the inverse before sample 0: every earlier target was zero."""
         return self.inverse.at_rest()
 
     def invert(self, state: Array, block: Array) -> tuple[Array, Array]:

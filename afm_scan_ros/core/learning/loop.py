@@ -8,7 +8,7 @@ from attrs import define, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.comparison import rms_of
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.learning.correction import Correction
@@ -36,7 +36,7 @@ class LearningSession(Protocol):
     """A scanner that repeats a scan with a corrected reference."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction) -> Scan:
-        """Scan with all of a model's inverses, and with the preview that they need.
+        """Scan with all of a model's inverses.
 
         Raises InputError or ScanError where the scan cannot be made.
         """
@@ -116,11 +116,10 @@ def learn(
         )
     correction = Correction.none(spec)
     target = correction.reference()
-    preview = preview_of(model, spec.sample_period)
-    drive = _DriveLimits(model, spec, preview, limits)
+    drive = _DriveLimits(model, spec, limits)
     axes: dict[str, _AxisInLoop] = {}
     for name in AXES:
-        learning = AxisLearning(spec, model.axis(name), target.axis(name), preview)
+        learning = AxisLearning(spec, model.axis(name), target.axis(name))
         axes[name] = _AxisInLoop(learning, np.zeros(len(learning.frequencies), bool))
     steps: Mapping[str, LearningStep] = {}
     restored: tuple[str, ...] = ()
@@ -156,7 +155,6 @@ class _DriveLimits:
 
     model: ScannerModel
     spec: ScanSpec
-    preview: float
     limits: DriveLimits
 
     def feasible(
@@ -196,10 +194,9 @@ class _DriveLimits:
         return Correction(self.spec, **signals)
 
     def _keeps(self, correction: Correction) -> bool:
-        settings = InverseSettings(preview=self.preview)
         period = self.spec.sample_period
         try:
-            Compensation(self.model, period, INVERSES, settings, self.limits).whole(
+            Compensation(self.model, period, INVERSES, InverseSettings(), self.limits).whole(
                 correction.reference()
             )
         except ScanError:

@@ -117,9 +117,9 @@ class AxisLearning:
     ``frequencies`` (Hz) end where the model follows less than ``LEAST_SHARE`` of its reference.
     """
 
-    def __init__(self, spec: ScanSpec, axis: AxisModel, desired: Array, preview: float) -> None:
+    def __init__(self, spec: ScanSpec, axis: AxisModel, desired: Array) -> None:
         self.spectra = ScanSpectra.of_scan(spec)
-        gain, model = _responses(axis, self.spectra, preview)
+        gain, model = _responses(axis, self.spectra)
         self._count = 1 + int(np.flatnonzero(np.abs(model) >= LEAST_SHARE)[-1])
         self._gain, self._model = (self._used(each) for each in (gain, model))
         self.frequencies = self.spectra.frequencies[: self._count]
@@ -228,11 +228,10 @@ def _power(spectrum: Spectrum) -> Array:
     return np.asarray(spectrum.real**2 + spectrum.imag**2)
 
 
-def _responses(axis: AxisModel, spectra: ScanSpectra, preview: float) -> tuple[Spectrum, Spectrum]:
+def _responses(axis: AxisModel, spectra: ScanSpectra) -> tuple[Spectrum, Spectrum]:
     """Response of the model's vibration, m/V, and that of its inverse and itself in series."""
-    settings = InverseSettings(preview=preview)
     model = chain_of(axis)
-    kernel = model.vibration(spectra.period, settings).inverse.kernel
+    kernel = model.vibration(spectra.period, InverseSettings()).inverse.kernel
     taps = np.zeros(spectra.length)
     places = (np.arange(len(kernel.values)) - kernel.centre) % spectra.length
     np.add.at(taps, places, kernel.values)

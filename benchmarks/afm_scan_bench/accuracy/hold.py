@@ -3,8 +3,8 @@
 from attrs import evolve
 
 from afm_scan_bench.scans import relative_error, spec_at
-from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, optimal_kernel
-from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, VIBRATION_X, Vibration
+from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, RelativeWeight, optimal_kernel
+from afm_scan_ros.core.effects.vibration import VIBRATION_X, Vibration
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.report.table import Row, Table
 
@@ -39,7 +39,8 @@ def held_error(sample_rate: float, *, hold: bool) -> float:
     spec = evolve(spec_at(LINE_RATE), samples_per_line=round(sample_rate / LINE_RATE))
     target = desired(spec, 0, total_samples(spec))
     vibration = Vibration(VIBRATION_X, spec.sample_period)
-    kernel = optimal_kernel(VIBRATION_X.response, DEFAULT_WEIGHT, spec.sample_period)
+    weight = RelativeWeight().at(VIBRATION_X.bandwidth)
+    kernel = optimal_kernel(VIBRATION_X.response, weight, spec.sample_period)
     inverse = vibration.inverse if hold else OptimalInverse(kernel, 0)
     drive = inverse.invert_whole(target.x)
     _, achieved = vibration.apply(vibration.at_rest(), drive)

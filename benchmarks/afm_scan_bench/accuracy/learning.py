@@ -15,8 +15,7 @@ from attrs import evolve
 
 from afm_scan_bench.scans import SEED
 from afm_scan_ros.core.comparison import rms_of
-from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, sampled_kernel
-from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT
+from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, SmoothWeight, sampled_kernel
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.types import Array, Trace
@@ -28,6 +27,7 @@ AXIS = "x"
 ROUNDS = 25
 GAIN = 0.5
 """g, over the gain of the hysteresis at rest."""
+WEIGHT = SmoothWeight(corner=5000.0, order=2)
 LENGTH = 2**16
 """Samples of the response; the sharpest mode has died out."""
 
@@ -54,7 +54,7 @@ def error(done: Scan) -> float:
 def _learning(plant: PlantSpec, period: float) -> OptimalInverse:
     """L, which knows every target ahead."""
     answer = np.fft.rfft(_impulse_response(plant, period))
-    kernel = sampled_kernel(lambda _: answer, DEFAULT_WEIGHT, period, LENGTH)
+    kernel = sampled_kernel(lambda _: answer, WEIGHT, period, LENGTH)
     return OptimalInverse(kernel, kernel.centre)
 
 

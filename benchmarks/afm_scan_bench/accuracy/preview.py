@@ -8,7 +8,6 @@ from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import default_model, spec_at
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse
 from afm_scan_ros.core.effects.vibration import Vibration
-from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Table
@@ -36,9 +35,7 @@ def preview_error(inverse: OptimalInverse, targets: Array, previews: Sequence[in
 def measure() -> Table:
     """Largest difference between stream and whole trajectory, relative to the drive's range."""
     spec = spec_at(LINE_RATE)
-    vibration = Vibration(
-        default_model().axis("x").vibration, spec.sample_period, InverseSettings().design()
-    )
+    vibration = Vibration(default_model().axis("x").vibration, spec.sample_period)
     previews = [round(1e-3 * ms / spec.sample_period) for ms in PREVIEWS_MS]
     targets = desired(spec, 0, total_samples(spec)).x
     errors = preview_error(vibration.inverse, targets, previews)

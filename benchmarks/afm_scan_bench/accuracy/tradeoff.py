@@ -4,6 +4,7 @@ from attrs import evolve
 
 from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, lines_of, rms_percent, scan, spec_at, tracking
+from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -35,7 +36,7 @@ def measure() -> Table:
 def row(spec: ScanSpec, corner: float) -> Row | None:
     """Figures of one scan; None where the drive would leave its limits."""
     try:
-        done = scan(spec, ALL, InverseSettings(weight_corner=corner))
+        done = scan(spec, ALL, InverseSettings(weight=SmoothWeight(corner, RelativeWeight().order)))
     except ScanError:
         return None
     return {

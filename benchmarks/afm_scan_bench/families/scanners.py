@@ -17,7 +17,7 @@ from afm_scan_bench.families.operators import (
     applied,
 )
 from afm_scan_bench.scans import ALL, SEED, default_plant
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
@@ -112,11 +112,10 @@ class FamilyScanner:
         return found
 
     def scan(self, spec: ScanSpec, model: AxisModel) -> Scan:
-        """Scan with all inverses of a model, and the preview it needs; both axes are alike."""
+        """Scan with all inverses of a model; both axes are alike."""
         both, period = ScannerModel(model, model), spec.sample_period
         limits = default_plant().amplifier.limits
-        settings = InverseSettings(preview=preview_of(both, period))
-        compensation = Compensation(both, period, ALL, settings, limits)
+        compensation = Compensation(both, period, ALL, InverseSettings(), limits)
         target = desired(spec, 0, total_samples(spec))
         drive = compensation.whole(target)
         moved = [self.displacement(drive.axis(name), period, SEED) for name in "xy"]

@@ -9,7 +9,7 @@ from numpy.random import Generator, default_rng
 
 from afm_scan_bench.scans import ALL, default_model, default_plant
 from afm_scan_bench.speed.timing.ratios import COLUMNS, by_turns, processor_seconds, row
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, TrialSpectra
 from afm_scan_ros.core.model import InverseSettings
@@ -30,8 +30,7 @@ def measure(spec: ScanSpec = SPEC, turns: int = 7) -> Table:
     target = Correction.none(spec).reference()
     axes = [_Axis.of(spec, name, target, rng) for name in AXES]
     model, limits = default_model(), default_plant().amplifier.limits
-    settings = InverseSettings(preview=preview_of(model, spec.sample_period))
-    compensation = Compensation(model, spec.sample_period, ALL, settings, limits)
+    compensation = Compensation(model, spec.sample_period, ALL, InverseSettings(), limits)
 
     def inverted() -> None:
         compensation.whole(target)
@@ -64,8 +63,7 @@ class _Axis:
     def of(cls, spec: ScanSpec, name: str, target: Trace, rng: Generator) -> "_Axis":
         """Take scans whose error is the sensor's noise."""
         desired, model = target.axis(name), default_model()
-        preview = preview_of(model, spec.sample_period)
-        learning = AxisLearning(spec, model.axis(name), desired, preview)
+        learning = AxisLearning(spec, model.axis(name), desired)
         noise = default_plant().sensor.noise_rms
         measured = [desired + noise * rng.standard_normal(len(desired)) for _ in range(BEFORE + 1)]
         trials = [learning.trial(desired, each) for each in measured[:BEFORE]]

@@ -3,7 +3,7 @@
 from attrs import define, field
 
 from afm_scan_bench.scans import ALL, SEED, default_model
-from afm_scan_ros.core.compensation import Compensation, preview_of
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.learning.loop import LearningScan, learn
 from afm_scan_ros.core.metrics import Scan
@@ -30,11 +30,9 @@ class RepeatingScanner:
 
     def drive(self, spec: ScanSpec, model: ScannerModel, correction: Correction) -> Trace:
         """Return the drive of a scan, V. Raises ScanError where it would leave the limits."""
-        settings = InverseSettings(preview=preview_of(model, spec.sample_period))
         limits = self.plant.amplifier.limits
-        return Compensation(model, spec.sample_period, ALL, settings, limits).whole(
-            correction.reference()
-        )
+        compensation = Compensation(model, spec.sample_period, ALL, InverseSettings(), limits)
+        return compensation.whole(correction.reference())
 
     def driven(self, spec: ScanSpec, drive: Trace) -> Scan:
         """Scan with a given drive, V."""

@@ -9,14 +9,16 @@ import pytest
 
 from afm_scan_ros.core.effects.optimal_inverse import (
     OptimalInverse,
+    RelativeWeight,
     SmoothWeight,
     optimal_kernel,
 )
-from afm_scan_ros.core.effects.vibration import DEFAULT_WEIGHT, InverseDesign, Vibration
+from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 MODEL = paper.vibration()
+WEIGHT = RelativeWeight().at(MODEL.bandwidth)
 RANGE = 40e-6
 
 
@@ -94,7 +96,7 @@ def test_the_whole_is_equation_22_on_the_whole_trajectory() -> None:
     omega = np.linspace(0.0, np.pi / period, size // 2 + 1)
     _, impulse = effect.apply(effect.at_rest(), np.eye(1, size)[0])
     gain = np.fft.rfft(impulse)
-    cost = DEFAULT_WEIGHT.ratio(omega, period) * np.abs(gain[0]) ** 2
+    cost = WEIGHT.ratio(omega, period) * np.abs(gain[0]) ** 2
     modified = np.fft.rfft(targets, size) * gain.conj() / (np.abs(gain) ** 2 + cost)
     expected = np.fft.irfft(modified, size)[: len(targets)]
     whole = effect.inverse.invert_whole(targets)
@@ -111,7 +113,7 @@ def test_leaving_the_hold_out_is_half_a_sample_period_late() -> None:
     lag = {}
     for rate in (20e3, 100e3):
         effect, targets = Vibration(MODEL, 1.0 / rate), raster(rate)
-        gone = OptimalInverse(optimal_kernel(MODEL.response, DEFAULT_WEIGHT, 1.0 / rate), 0)
+        gone = OptimalInverse(optimal_kernel(MODEL.response, WEIGHT, 1.0 / rate), 0)
         late = effect.inverse.invert_whole(targets) - gone.invert_whole(targets)
         _, lag[rate] = effect.apply(effect.at_rest(), late)
         half_period_of_motion = 0.5 * np.gradient(targets)

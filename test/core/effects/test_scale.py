@@ -7,10 +7,12 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.effects.scale import REFERENCE_LENGTH, REFERENCE_VOLTAGE, Scale, scale_of
-from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Trace
 from helpers.scaling import scaled_axis, scaled_trace
@@ -98,3 +100,33 @@ def test_a_fit_of_a_scaled_scanner_starts_at_scaled_values(
     sizes = [scale.factor(parameter.unit) for parameter in form.parameters]
     expected = [np.array(sizes) * start for start in form.starts(features)]
     np.testing.assert_allclose([*form.at(scale).starts(other)], expected, rtol=1e-4)
+
+
+@every_form
+@settings(deadline=None, max_examples=3)
+@given(scale=scales)
+def test_the_drive_of_a_scaled_scanner_is_the_scaled_drive(
+    name: str, kind: str, scale: Scale
+) -> None:
+    """So the inverse errs alike on a fast and on a slow scanner: no number in Hz or s decides."""
+    form = effect_type(name).form(kind)
+    values = [scale.factor(p.unit) * v for p, v in zip(form.parameters, form.example, strict=True)]
+    target = Trace(0, PERIOD, *(paper.smooth_target(seed, 2000, 3e-6) for seed in (1, 2)))
+    scaled = scaled_trace(target, scale.length, scale.time)
+    other = scaled_axis(AXIS, scale)
+    base, found = (
+        Compensation(
+            ScannerModel(evolve(axis, added=(Added(name, kind, at),)), axis),
+            wanted.sample_period,
+            INVERSES,
+            InverseSettings(),
+            DriveLimits(np.inf, np.inf),
+        ).whole(wanted)
+        for axis, at, wanted in (
+            (AXIS, form.example, target),
+            (other, tuple(values), scaled),
+        )
+    )
+    np.testing.assert_allclose(
+        found.x, scale.voltage * base.x, rtol=0.0, atol=1e-6 * scale.voltage * np.ptp(base.x)
+    )

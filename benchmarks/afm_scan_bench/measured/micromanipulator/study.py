@@ -20,6 +20,7 @@ from afm_scan_ros.api.identification import identify
 from afm_scan_ros.api.model import Model
 from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings
 from afm_scan_ros.core.types import Array
@@ -29,7 +30,7 @@ FOLDER = "piezo_micromanipulator"
 SAMPLE_RATE = 200
 T = 1.0 / SAMPLE_RATE
 PERIOD = SAMPLE_RATE  # samples of the 1 Hz sines
-SETTINGS = InverseSettings(weight_corner=20.0, weight_order=2, preview=0.3)
+SETTINGS = InverseSettings(weight=SmoothWeight(corner=20.0, order=2), preview=0.3)
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 MICRO = 1e-6
 
