@@ -30,7 +30,7 @@ help:
 	@echo "make docs           build the documentation site in site/"
 	@echo "make clean          remove what these made"
 
-demo: $(VENV)/ready
+demo: $(VENV)/installed
 	$(VENV)/bin/afm-scan demo --out demo
 
 test: test-suite
@@ -77,7 +77,8 @@ docs: $(VENV)/ready
 clean:
 	rm -rf $(VENV) $(ROS) .venv-uv demo build site *.egg-info
 
-$(VENV)/ready: $(INPUTS)
+# What the package itself needs.
+$(VENV)/installed: $(INPUTS)
 	@for p in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
 	  test -z "$$found" && $$p -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))" \
 	    2>/dev/null && found=$$p; \
@@ -88,9 +89,16 @@ $(VENV)/ready: $(INPUTS)
 	rm -rf $(VENV); \
 	$$found -m venv $(VENV) || { echo "Python's venv module is incomplete;" \
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(VENV); exit 1; }
-	@echo "Installing afm_scan_ros and what it needs into $(VENV) (once, about a minute)"
+	@echo "Installing afm_scan_ros and what it needs into $(VENV) (once, half a minute)"
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(VENV)/bin/python -m compileall -q -j 0 afm_scan_ros
+	@touch $@
+
+# And what tests, benchmarks and documents need.
+$(VENV)/ready: $(VENV)/installed
+	@echo "Installing what the tests and the documents need into $(VENV) (once, a minute and a half)"
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[docs,test]" --editable benchmarks
-	@$(VENV)/bin/python -m compileall -q -j 0 afm_scan_ros benchmarks/afm_scan_bench
+	@$(VENV)/bin/python -m compileall -q -j 0 benchmarks/afm_scan_bench
 	@touch $@
 
 # Files that are edited need no rebuild: they are linked.

@@ -112,7 +112,9 @@ class ScanNode(Node, ABC):
     def scan(self) -> ScanInfo:
         """The scan that the node takes part in; raises ScanError before it knows one."""
         if self.info is None:
-            raise ScanError("a block came before scan_info: is an earlier scan still running?")
+            raise ScanError(
+                "a block came before scan_info: this node came late, or an earlier scan still runs"
+            )
         return self.info
 
     @property

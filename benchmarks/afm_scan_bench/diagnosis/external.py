@@ -37,7 +37,7 @@ PLANT = share_directory() / "config/plants/delay_medium.yaml"
 MODEL = share_directory() / "config/model.yaml"
 LINK = NetworkLink(loss=0.0, delay=1e-3, spread=0.0)
 HERE, THERE = ADDRESSES
-AFM_SCAN = [sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()"]
+AFM_SCAN = [sys.executable, "-P", "-c", "from afm_scan_ros.cli.main import main; main()"]
 UNHURRIED: Mapping[str, object] = {"real_time": False, "liveness_timeout_s": 60.0}
 """Of the scanner's node, as of those that the command starts: nobody's pace matters."""
 COLUMNS = {

@@ -144,7 +144,7 @@ class FaultyProcesses:
             }
         node = _started("faulty_node", fault, log, given, blocks)
         watch = f"from {__name__} import watch; watch()"
-        viewer = subprocess.Popen([sys.executable, "-c", watch]) if fault.viewer else None  # noqa: S603
+        viewer = subprocess.Popen([sys.executable, "-P", "-c", watch]) if fault.viewer else None  # noqa: S603
         return cls(fault, OutputLog(log), node, viewer)
 
     def inject(self, trial: Trial) -> None:
@@ -193,7 +193,7 @@ def _started(
     arguments = [word for pair in pairs for word in ("-p", pair)]
     with (log.parent / f"{run}.txt").open("wb") as output:
         return subprocess.Popen(  # noqa: S603 - our own interpreter and module
-            [sys.executable, "-c", code, fault.name, str(log), "--ros-args", *arguments],
+            [sys.executable, "-P", "-c", code, fault.name, str(log), "--ros-args", *arguments],
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,

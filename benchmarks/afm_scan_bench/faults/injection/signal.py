@@ -30,7 +30,7 @@ COMMAND = "afm-scan scan"
 TARGETS = (*NODES, COMMAND)
 _LONGEST = 2.0
 _POLL = 0.01
-_AFM_SCAN = (sys.executable, "-c", "from afm_scan_ros.cli.main import main; main()")
+_AFM_SCAN = (sys.executable, "-P", "-c", "from afm_scan_ros.cli.main import main; main()")
 
 
 @define
