@@ -12,6 +12,7 @@ from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report.analysis import analyse, scan_spec
 from afm_scan_ros.report.scan_figures import (
@@ -84,7 +85,7 @@ def demo(out: Path) -> None:
     for rate, figure in figures.items():
         save(figure, out / f"comparison_{rate:g}hz.png")
     page = report(tables, figures, (IMAGED[0], _images(out)), next_commands(out))
-    (out / "report.html").write_text(page, "utf-8")
+    write_text(out / "report.html", page)
     click.echo(f"Report: {out / 'report.html'}. Bags, figures and JSON are in the same folder.")
 
 
