@@ -33,7 +33,7 @@ OF_THE_USER = (
 """Variables that would join a test with the user's own nodes."""
 
 
-WAITING = {"drivers", "nodes"}
+WAITING = {"drivers", "nidaqmx", "nodes"}
 """Folders of tests that mostly wait for other processes."""
 
 

@@ -10,15 +10,19 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
-    from afm_scan_ros.api.images import ImageIdentification, correct_image, identify_from_images
     from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.record import Record, read_record
     from afm_scan_ros.core.errors import InputError, ScanError
-    from afm_scan_ros.core.imaging.scan_image import ScanImage
     from afm_scan_ros.core.limits import DriveLimits
     from afm_scan_ros.core.scan_spec import ScanSpec
-    from afm_scan_ros.files.images.formats import read_image
+    from afm_scan_ros.features.images.files.formats import read_image
+    from afm_scan_ros.features.images.identify import (
+        ImageIdentification,
+        correct_image,
+        identify_from_images,
+    )
+    from afm_scan_ros.features.images.scan_image import ScanImage
 
     __version__: str
 
@@ -48,21 +52,21 @@ __all__ = [
 _MODULES = {
     "Diagnosis": "api.diagnosis",
     "DriveLimits": "core.limits",
-    "ImageIdentification": "api.images",
+    "ImageIdentification": "features.images.identify",
     "InputError": "core.errors",
     "Learned": "api.learning",
     "Model": "api.model",
     "Record": "api.record",
     "ScanError": "core.errors",
-    "ScanImage": "core.imaging.scan_image",
+    "ScanImage": "features.images.scan_image",
     "ScanSpec": "core.scan_spec",
-    "correct_image": "api.images",
+    "correct_image": "features.images.identify",
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
-    "identify_from_images": "api.images",
+    "identify_from_images": "features.images.identify",
     "learn": "api.learning",
     "load_model": "api.model",
-    "read_image": "files.images.formats",
+    "read_image": "features.images.files.formats",
     "read_record": "api.record",
     "trajectory": "api.model",
 }

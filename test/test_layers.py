@@ -28,6 +28,9 @@ NEVER = {
     "report": ("api", "cli", "pipeline"),
     "api": ("cli", "nodes", "pipeline", "simulation"),
 }
+FEATURES = sorted(
+    path.name for path in (PACKAGE / "features").iterdir() if path.is_dir() and path.name[0] != "_"
+)
 SIMULATION_MAY = {"types", "errors", "compiled", "limits"}
 
 
@@ -52,6 +55,20 @@ def test_the_data_goes_one_way(folder: str) -> None:
         for other in NEVER[folder]:
             back = [name for name in names if f"{name}.".startswith(f"afm_scan_ros.{other}.")]
             assert not back, f"{path.relative_to(PACKAGE)} imports {back}"
+
+
+def test_the_kernel_imports_no_feature() -> None:
+    """It finds them by their registry; the package's own names may be a feature's."""
+    for path, names in imports_of(PACKAGE).items():
+        if path.relative_to(PACKAGE).parts[0] not in ("__init__.py", "features"):
+            assert not [n for n in names if n.startswith("afm_scan_ros.features.")], path
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+def test_no_feature_imports_another(feature: str) -> None:
+    for path, names in imports_of(PACKAGE / "features" / feature).items():
+        found = {name.split(".")[2] for name in names if name.startswith("afm_scan_ros.features.")}
+        assert found <= {feature}, path
 
 
 def test_the_plant_shares_no_physics_with_the_model() -> None:

@@ -8,6 +8,7 @@ from typing import NoReturn
 
 import click
 
+from afm_scan_ros import features
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.files import version
 from afm_scan_ros.report.terminal import complain, showing_log
@@ -20,15 +21,13 @@ COMMANDS = {
     "identify": "Identify a model of the scanner from its records.",
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
-    "survey": "Diagnose many recordings, and say which instruments changed and when.",
     "adapt": "Accept into the model what changed in the scanner during a scan.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
     "learn": "Repeat a scan and learn its reference from the measured errors.",
-    "grating": "Identify a scanner without a sensor from images of a grating.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
-    "export": "Write images and signals of a bag for other programs.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
+    **features.commands(),
 }
 
 MODULES = {
@@ -62,13 +61,15 @@ class _Lazy(click.Group):
         return [*COMMANDS, *BENCHMARKS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command NAME of its module in ``afm_scan_ros.cli``."""
+        """Return the command NAME of its module in ``afm_scan_ros.cli``, or of its feature."""
         del ctx
         if cmd_name not in COMMANDS:
             return _plugin(cmd_name)
         name = cmd_name.replace("-", "_")
-        module = import_module(f"afm_scan_ros.cli.{MODULES.get(cmd_name, name)}")
-        command: click.Command = getattr(module, name)
+        module = f"afm_scan_ros.cli.{MODULES.get(cmd_name, name)}"
+        if cmd_name in features.commands():
+            module = features.module_of(cmd_name)
+        command: click.Command = getattr(import_module(module), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

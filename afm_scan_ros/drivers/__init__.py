@@ -15,6 +15,7 @@ from typing import Any, ClassVar, get_type_hints
 from attrs import field, frozen
 from attrs.validators import ge, gt, in_
 
+from afm_scan_ros import features
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import AmplifierSpec, ramp_to_rest
 from afm_scan_ros.core.types import Array, Trace
@@ -150,10 +151,10 @@ def samples_in(duration: float, sample_period: float) -> int:
 
 OURS = {
     "simulated": "afm_scan_ros.drivers.simulated:SimulatedScanner",
-    "nidaqmx": "afm_scan_ros.drivers.ni:NiDaqmx",
+    **features.drivers(),
 }
 """Short names of the drivers of this package."""
-EXTRAS = ("nidaqmx",)
+EXTRAS = tuple(features.drivers())
 """Packages that a driver of that name needs, an extra of this package each."""
 
 

@@ -10,7 +10,6 @@ from attrs import field, frozen
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.timing import timing_of
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.images.channels import Signal
 from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
@@ -293,6 +292,15 @@ BLOCK = 100_000
 """Rows that are held as text at once."""
 EXACT = "%.17g"
 """Digits that give back every float."""
+
+
+@frozen(eq=False)
+class Signal:
+    """Samples of one scan against time, shape (n,): ``name`` as ``desired_x``, in ``unit``."""
+
+    name: str
+    unit: str
+    values: Array
 
 
 def write_signals(path: Path, signals: Sequence[Signal]) -> None:

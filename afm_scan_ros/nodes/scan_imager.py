@@ -12,7 +12,7 @@ import numpy as np
 
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.lines import ImageLines, frame_of
+from afm_scan_ros.core.image_lines import ImageLines, frame_of
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.imaging.lines import LineImager, frame_of
+from afm_scan_ros.core.image_lines import LineImager, frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import TO_AND_FRO, SampleKinds, phases, sample_kinds

@@ -10,8 +10,7 @@ import pytest
 import afm_scan_ros as afm
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.columns import write_signals
-from afm_scan_ros.files.images.channels import Signal
+from afm_scan_ros.files.columns import Signal, write_signals
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import save_scan
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 
 from afm_scan_ros.cli.processes import NodeProcess
-from afm_scan_ros.core.imaging.lines import frame_of
+from afm_scan_ros.core.image_lines import frame_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.topics import RETRACE_IMAGE, TRACE_IMAGE

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from afm_scan_bench.images.detection import Detection, detected
 from afm_scan_bench.images.tube_scanner import TubeScanner, TubeState
-from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.scan_image import ScanImage
 
 READ = 10
 """Heights that are read in a pixel, evenly spaced."""

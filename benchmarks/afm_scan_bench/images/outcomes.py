@@ -11,13 +11,13 @@ from afm_scan_bench.images.acquire import Acquired, Frame
 from afm_scan_bench.images.cases import Case, draw_case
 from afm_scan_bench.images.score import Places, Score, commanded, scaled, score, true_places
 from afm_scan_bench.images.tracking import RATES, Inverse, by_gains, error_of, linear_inverse
-from afm_scan_ros.api.images import ACCURACY, identified_from
-from afm_scan_ros.core.imaging.grating.registered_image import (
+from afm_scan_ros.features.images.grating.registered_image import (
     RegisteredImage,
     accurate_ones,
     pitch_uncertainty,
     register_image,
 )
+from afm_scan_ros.features.images.identify import ACCURACY, identified_from
 
 VARIANTS: Mapping[str, tuple[int, ...]] = {
     "one pair at 1 Hz": (0,),

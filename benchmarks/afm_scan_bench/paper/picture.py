@@ -8,7 +8,7 @@ from afm_scan_bench.paper.grating import GratingFigures, grating_figures
 from afm_scan_bench.paper.regrid import regrid
 from afm_scan_bench.paper.ripple import Ripple, line_path
 from afm_scan_bench.paper.scanner import PaperScan
-from afm_scan_ros.core.imaging.lines import LineImager, frame_of
+from afm_scan_ros.core.image_lines import LineImager, frame_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.sample import Grating, Sample
 

@@ -12,13 +12,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.survey.fleet import NIGHT, START, Instrument, drawn_fleet, write_fleet
-from afm_scan_ros.api.survey import survey_bag
 from afm_scan_ros.bag.collection import found_bags
-from afm_scan_ros.cli.survey import FALSE_ALARM, Surveyor
-from afm_scan_ros.cli.workers import in_processes
-from afm_scan_ros.core.survey.changes import Change
-from afm_scan_ros.files.survey_files import SurveyFolder
-from afm_scan_ros.report.survey import Survey
+from afm_scan_ros.features.survey.assignment import survey_bag
+from afm_scan_ros.features.survey.changes import Change
+from afm_scan_ros.features.survey.folder import SurveyFolder
+from afm_scan_ros.features.survey.page import Survey
+from afm_scan_ros.features.survey.survey_command import FALSE_ALARM, Surveyor
+from afm_scan_ros.features.survey.workers import in_processes
 from afm_scan_ros.report.table import Row, Table
 
 INSTRUMENTS, CHANGING, NIGHTS, SEED = 10, 3, 20, 1

@@ -18,16 +18,16 @@ from distributed import LocalCluster
 
 from afm_scan_bench.scans import ALL, BENCH_SPEC, scan
 from afm_scan_bench.survey.fleet import NIGHT, START
-from afm_scan_ros.api.survey import Assignment, survey_bag
 from afm_scan_ros.bag.collection import FoundBag, found_bags
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
-from afm_scan_ros.cli.survey import FALSE_ALARM, Surveyor
-from afm_scan_ros.cli.workers import Outcome, on_cluster
-from afm_scan_ros.core.survey.recording import Recording
 from afm_scan_ros.core.trajectory import total_samples
+from afm_scan_ros.features.survey.assignment import Assignment, survey_bag
+from afm_scan_ros.features.survey.folder import SurveyFolder
+from afm_scan_ros.features.survey.recording import Recording
+from afm_scan_ros.features.survey.survey_command import FALSE_ALARM, Surveyor
+from afm_scan_ros.features.survey.workers import Outcome, on_cluster
 from afm_scan_ros.files import share_directory
-from afm_scan_ros.files.survey_files import SurveyFolder
 from afm_scan_ros.report.table import Row, Table
 
 BAGS = 100

@@ -10,10 +10,10 @@ from afm_scan_ros.core.identification.joint.density import CellGrid
 from afm_scan_ros.core.identification.joint.fit import COARSE, _still, held_out_by_density
 from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept, swept
 from afm_scan_ros.core.identification.joint.search import NO_CREEP
-from afm_scan_ros.core.imaging.grating.models import Positions, model_of
-from afm_scan_ros.core.imaging.predicted import LineDrive
-from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.grating.models import Positions, model_of
+from afm_scan_ros.features.images.predicted import LineDrive
+from afm_scan_ros.features.images.scan_image import ScanImage
 
 ALPHA, BETA, GAMMA = 0.35, 1.2, 0.3
 SIZE, RANGE = 128, 40e-6

@@ -15,15 +15,15 @@ from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.outcome import Tally
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
-from afm_scan_ros.core.imaging.scan_image import ScanImage
 from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import load_settings
+from afm_scan_ros.features.images.files.channels import image_channels
+from afm_scan_ros.features.images.files.formats import write_image
+from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.drive_files import read_drive
-from afm_scan_ros.files.images.channels import image_channels
-from afm_scan_ros.files.images.formats import write_image
 from afm_scan_ros.files.learned_file import load_learned, save_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_plant, load_scan

@@ -1,1 +1,0 @@
-"""Images from scan paths."""

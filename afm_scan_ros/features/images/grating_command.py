@@ -1,0 +1,147 @@
+"""``afm-scan grating``: the model of a scanner without a sensor, from images of a grating."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+from attrs import evolve
+
+from afm_scan_ros.cli.options import FILE, FOLDER, NEW_FILE, positive, refuse_existing, working
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.features.images.corrected_image import correction_figure
+from afm_scan_ros.features.images.files.channels import image_channels, words_of
+from afm_scan_ros.features.images.files.formats import WRITTEN, read_image, write_image
+from afm_scan_ros.features.images.identify import ACCURACY, correct_image, identify_from_images
+from afm_scan_ros.features.images.report import grating_table, left_out, not_separated
+from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.report.effect_status_text import intervals_text, status_text
+from afm_scan_ros.report.scan_figures import save
+from afm_scan_ros.report.terminal import say
+
+PER_MICROMETRE = 1e6
+SUFFIX = ".gwy"
+
+
+@click.command()
+@click.argument("images", nargs=-1, required=True, type=FILE, metavar="IMAGE...")
+@click.option(
+    "--pitch",
+    type=positive("m"),
+    required=True,
+    help="Pitch of the grating, as 10um. Of a chessboard, that along a row.",
+)
+@click.option("--out", type=NEW_FILE, required=True, help="Model file to write.")
+@click.option(
+    "--correct",
+    type=FILE,
+    multiple=True,
+    metavar="IMAGE",
+    help="Another image of this scanner, to be corrected by the model. May be repeated.",
+)
+@click.option(
+    "--images",
+    "folder",
+    type=FOLDER,
+    help="Folder for the corrected images (.gwy and .png), the table as JSON and its picture.",
+)
+@click.option(
+    "--volts-per-um",
+    "scale",
+    type=click.FloatRange(0.0, min_open=True),
+    help="Drive over commanded position, V/µm. Without it, 1 V stands for 1 µm commanded.",
+)
+@click.option(
+    "--accuracy",
+    type=click.FloatRange(0.0, min_open=True),
+    default=float(f"{100.0 * ACCURACY:g}"),
+    show_default=True,
+    help="Accuracy of the pitch that an image must reach, % rms.",
+)
+@click.option(
+    "--line-time",
+    type=positive("s"),
+    help="Time of trace and retrace together, for files that do not state it.",
+)
+def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    images: tuple[Path, ...],
+    pitch: float,
+    out: Path,
+    correct: tuple[Path, ...],
+    folder: Path | None,
+    scale: float | None,
+    accuracy: float,
+    line_time: float | None,
+) -> None:
+    """Identify a scanner without a displacement sensor from images of a grating of known pitch.
+
+    Each IMAGE holds trace and retrace of a scan that nothing corrected. The model of x has gain
+    and hysteresis. From images of several line rates it has creep, and a resonance or a lag, too.
+    The model of y is a gain. The corrected images show the heights where the scanner was.
+    """
+    if correct and folder is None:
+        raise click.UsageError("--correct needs a folder for the corrected images: give --images")
+    refuse_existing(out, other="file")
+    if folder is not None:
+        refuse_existing(folder)
+        targets = _targets(folder, (*images, *correct))
+
+    given, others = ([_timed(path, line_time) for path in paths] for paths in (images, correct))
+    volts_per_metre = PER_MICROMETRE * (scale or 1.0)
+    with working("grating", at_once=False) as report:
+        found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
+    found.model.save(out)
+    used = found.images
+    table = grating_table(used, found.positions, found.figures, found.drift, found.refused)
+    table.show()
+    effects = found.model.effects["x"]
+    for name, status in effects.each():
+        drive = "µm commanded" if scale is None else "V"
+        known = filter(None, (status_text(status, drive), intervals_text(status)))
+        say(f"x: {name} is {': '.join(known)}.")
+    for sentence in (*left_out(used, found.positions), *not_separated(used, effects)):
+        say(sentence)
+    for reason in found.refused:
+        say(f"Not used: {reason}.")
+    coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
+    held = f"x with what is identified above, and y as a gain{coupled}"
+    say(f"{out} holds the model: {held}.")
+    if folder is not None:
+        table.save(folder)
+        for image, better in zip(used, found.corrected, strict=True):
+            _write_corrected(targets[given.index(image)], image, better)
+        for target, image in zip(targets[len(given) :], others, strict=True):
+            _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
+        say(f"{folder} holds the corrected images, their pictures and the table.")
+
+
+def _timed(path: Path, line_time: float | None) -> ScanImage:
+    """Read an image; a ``line_time`` (s) is for a file that states none."""
+    found = read_image(path)
+    if line_time is None:
+        return found
+    if found.line_time is not None:
+        raise InputError(f"{path} states {found.line_time:.4g} s for a line: leave --line-time out")
+    return evolve(found, line_time=line_time)
+
+
+def _targets(folder: Path, images: Sequence[Path]) -> list[Path]:
+    """Return the file of each corrected image.
+
+    Raises InputError where two images have the same name, or where no such file can be written.
+    """
+    targets = [folder / f"{path.stem}.corrected{SUFFIX}" for path in images]
+    for number, target in enumerate(targets):
+        WRITTEN[SUFFIX].load(target, "write")
+        if target in targets[:number]:
+            raise InputError(f"{images[number]}: another image has this name too: rename one")
+    return targets
+
+
+def _write_corrected(target: Path, image: ScanImage, corrected: ScanImage | None) -> None:
+    """Write a corrected image, if there is one, and a picture of it beside the recorded one."""
+    name = Path(image.name).name
+    if corrected is None:
+        say(f"{name} is not corrected: the scanner turned back within a line.")
+        return
+    write_image(target, image_channels(corrected), words_of(corrected))
+    save(correction_figure(name, image, corrected), target.with_suffix(".png"))
