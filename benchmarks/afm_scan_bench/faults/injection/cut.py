@@ -31,7 +31,7 @@ def endanger(folder: Path) -> DriveOutcome:
     done, log = DriveOutcome(), OutputLog(folder / "outputs.txt")
     own = {"output_log": str(log.path), "min_subscriptions": 0, "min_true_subscriptions": 0}
     commands = {
-        HERE: NodeCommand(SOURCE, RECORD),
+        HERE: NodeCommand(SOURCE, {**RECORD, "required_nodes": [SCANNER], "min_subscriptions": 1}),
         THERE: NodeCommand(SCANNER, own),
     }
     with two_hosts(GOOD, 0) as carried:

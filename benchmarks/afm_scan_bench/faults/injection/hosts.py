@@ -42,7 +42,10 @@ PROFILE = """<?xml version="1.0"?>
     </discovery_config></builtin>
   </rtps></participant>
   <data_writer profile_name="writer" is_default_profile="true">
-    <times><heartbeatPeriod><sec>0</sec><nanosec>20000000</nanosec></heartbeatPeriod></times>
+    <topic><resourceLimitsQos><max_samples>15000</max_samples></resourceLimitsQos></topic>
+    <times><heartbeatPeriod><sec>0</sec><nanosec>20000000</nanosec></heartbeatPeriod>
+      <nackSupressionDuration><sec>0</sec><nanosec>200000000</nanosec></nackSupressionDuration>
+    </times>
   </data_writer>
 </profiles>
 """
