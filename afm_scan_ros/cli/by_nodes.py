@@ -24,6 +24,7 @@ from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO, total_samples
 from afm_scan_ros.files.drive_files import save_drive
+from afm_scan_ros.nodes.flow import USUAL_WINDOW, block_size_at
 from afm_scan_ros.nodes.parameters import INVERSION, inversion_settings
 
 CORRECTED = 2.0
@@ -92,7 +93,9 @@ def _scan_commands(order: ScanOrder) -> list[NodeCommand]:
         "inverses": list(order.inverses),
     }
     fed_back = any(order.own[COMPENSATOR].get(name) for name in ("line_feedback", "adapt"))
+    inversion = _inversion(order)
     source = {
+        **_window(order, inversion),
         "required_nodes": [COMPENSATOR, scanner.node, "tracking_monitor", "scan_recorder", *names],
         "min_subscriptions": 3 + names.count("scan_imager"),
         "time_scale": order.time_scale,
@@ -105,26 +108,39 @@ def _scan_commands(order: ScanOrder) -> list[NodeCommand]:
         NodeCommand("scan_recorder", recorded, file_of("scan_recorder")),
         NodeCommand("tracking_monitor", {"min_subscriptions": 1}),
         *beside,
-        *_scanner_commands(scanner, {**readers, "step_limit_v": _step_limit(order)}),
+        *_scanner_commands(scanner, {**readers, "step_limit_v": _step_limit(order, inversion)}),
         NodeCommand(COMPENSATOR, model | drive_readers, file_of(COMPENSATOR)),
         NodeCommand("trajectory_generator", model | source, files.spec),
     ]
 
 
-def _step_limit(order: ScanOrder) -> float:
+def _inversion(order: ScanOrder) -> ScanInversion:
+    """Return the scan's inversion, by the model alone."""
+    own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    given = inversion_settings({**own, "inverses": order.inverses})
+    given = evolve(given, line_feedback=False, adapt=False)
+    return ScanInversion(order.model, order.spec, given)
+
+
+def _window(order: ScanOrder, inversion: ScanInversion) -> Parameters:
+    """Return a window that holds what the inverse looks ahead, where the usual one does not."""
+    size = order.flow.get("block_size") or block_size_at(order.spec.sample_period)
+    least = inversion.held_back + 2 * size
+    fits = order.flow.get("window") or USUAL_WINDOW * size >= least
+    return {} if fits else {"window": least}
+
+
+def _step_limit(order: ScanOrder, inversion: ScanInversion) -> float:
     """Return the largest step of the drive (V) that a scan needs, with room for its corrections.
 
     0 for none, where the scan is too long to be inverted before it begins or cannot be driven: the
     compensator says why.
     """
     own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
-    given = inversion_settings({**own, "inverses": order.inverses})
-    given = evolve(given, line_feedback=False, adapt=False)
     samples = total_samples(order.spec)
     if samples > own["preflight_samples"]:
         return 0.0
     try:
-        inversion = ScanInversion(order.model, order.spec, given)
         return CORRECTED * inversion.largest_step(samples)
     except ScanError:
         return 0.0

@@ -81,6 +81,11 @@ class ScanInversion:
         self.driven = 0
 
     @property
+    def held_back(self) -> int:
+        """Samples by which the drive that is known lags behind the desired displacement."""
+        return self._compensation.held_back
+
+    @property
     def remark(self) -> str:
         """What the line feedback can do; nothing without it."""
         if self._law is None:

@@ -18,7 +18,7 @@ USUAL_RATE = 50.0
 LEAST_BLOCK = 100
 """Samples."""
 USUAL_WINDOW = 20
-"""Blocks: 0.4 s of a scan, beside the 20 ms of preview and two blocks that are needed."""
+"""Blocks: 0.4 s of a scan, in which the inverse's preview and two blocks have to fit."""
 
 TIME_SCALE = NodeParameter(
     "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0

@@ -117,8 +117,7 @@ class InversionCompensator(BlockConsumer):
             raise InputError(f"inverses: {ours} here, but {theirs} in scan '{info.scan_id}'")
 
     def _refuse_narrow_window(self, block_size: int) -> None:
-        preview = round(self.settings["preview_ms"] * 1e-3 / self.scan.sample_period)
-        if self.scan.window < (least := preview + 2 * block_size):
+        if self.scan.window < (least := self._inversion.held_back + 2 * block_size):
             raise ScanError(
                 f"window = {self.scan.window} is less than the preview and two blocks:"
                 f" give at least {least}"

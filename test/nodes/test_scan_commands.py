@@ -11,9 +11,15 @@ from afm_scan_ros.cli import options
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
+from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.trajectory import phases
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.nodes.flow import USUAL_WINDOW
 from afm_scan_ros.nodes.topics import BLOCKS
+from helpers.scaling import scaled_axis
 from helpers.viewers import assert_curves_are_recorded, assert_samples_are_of_the_streams
 
 
@@ -75,3 +81,26 @@ def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_
     with pytest.raises(ScanError, match=r"compensator: sample .* amplifier's 2\.6: .*x \d"):
         run_scan(given, ("creep", "hysteresis", "vibration"))
     assert sorted(tmp_path.iterdir()) == [plant, spec]
+
+
+def test_the_window_holds_what_the_inverse_of_a_slow_scanner_looks_ahead(
+    spec: Path, tmp_path: Path
+) -> None:
+    """Its first resonance is 23 Hz, of which nine periods and two blocks are more than 0.4 s."""
+    slow = load_model(CONFIG / "model.yaml")
+    x, y = (scaled_axis(slow.axis(name), Scale(time=20.0)) for name in AXES)
+    save_model(tmp_path / "slow.yaml", ScannerModel(x, y), "A slow scanner.")
+    text = spec.read_text("utf-8").replace("    block_size: 500\n    window: 5000\n", "")
+    spec.write_text(text.replace("10.0\n    range_y_um: 10.0", "0.5\n    range_y_um: 0.5"), "utf-8")
+    given = ScanFiles(spec, tmp_path / "slow.yaml", CONFIG / "plant.yaml", tmp_path / "bag")
+    run_scan(given, ("vibration",), 0.0)
+    recording = read_scan(tmp_path / "bag")
+    assert recording.info.window > USUAL_WINDOW * 400
+    assert len(recording.whole("achieved_displacement").x) == recording.info.total_samples
+
+
+def test_a_window_that_the_preview_does_not_fit_in_is_refused(spec: Path, tmp_path: Path) -> None:
+    spec.write_text(spec.read_text("utf-8").replace("window: 5000", "window: 1100"), "utf-8")
+    least = r"window = 1100 is less than the preview and two blocks: give at least 12\d\d"
+    with pytest.raises(ScanError, match=least):
+        run_scan(files(spec, tmp_path / "bag"), ("vibration",))
