@@ -86,12 +86,12 @@ def test_a_scan_beyond_the_amplifier_is_refused_before_it_moves(spec: Path, tmp_
 def test_the_window_holds_what_the_inverse_of_a_slow_scanner_looks_ahead(
     spec: Path, tmp_path: Path
 ) -> None:
-    """Its first resonance is 23 Hz, of which nine periods and two blocks are more than 0.4 s."""
+    """Its first resonance is 11 Hz: its inverse looks ahead by half a second, a window by 0.4."""
     slow = load_model(CONFIG / "model.yaml")
-    x, y = (scaled_axis(slow.axis(name), Scale(time=20.0)) for name in AXES)
+    x, y = (scaled_axis(slow.axis(name), Scale(time=40.0)) for name in AXES)
     save_model(tmp_path / "slow.yaml", ScannerModel(x, y), "A slow scanner.")
     text = spec.read_text("utf-8").replace("    block_size: 500\n    window: 5000\n", "")
-    spec.write_text(text.replace("10.0\n    range_y_um: 10.0", "0.5\n    range_y_um: 0.5"), "utf-8")
+    spec.write_text(text.replace("10.0\n    range_y_um: 10.0", "0.1\n    range_y_um: 0.1"), "utf-8")
     given = ScanFiles(spec, tmp_path / "slow.yaml", CONFIG / "plant.yaml", tmp_path / "bag")
     run_scan(given, ("vibration",), 0.0)
     recording = read_scan(tmp_path / "bag")
