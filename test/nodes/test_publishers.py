@@ -140,8 +140,8 @@ def test_a_node_is_ready_once_it_counts_one_publisher(begin: Begin) -> None:
     """That of a process that was killed is counted for a while."""
     with one_more(DESIRED):
         scan = begin(ScanRecorder, DESIRED)
-        scan.until(lambda: scan.node.reason.startswith("waits for one publisher"))
-        assert scan.node.reason == "waits for one publisher of /desired_displacement, not 2"
+        said = "waits for one publisher of /desired_displacement, not 2"
+        scan.until(lambda: scan.node.reason == said)
         assert not scan.node.ready
     scan.until(lambda: scan.node.ready)
 
