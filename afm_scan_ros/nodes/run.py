@@ -19,7 +19,6 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
-from afm_scan_ros.nodes.ending import end_within
 from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
@@ -33,8 +32,6 @@ DISCOVERY = 4.0
 
 Fast DDS tells of a node, where the first word was lost, once more after 3 s.
 """
-ENDING = 5
-"""Seconds in which a node that is finished leaves ROS, or it ends without; usually 0.1."""
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
@@ -128,7 +125,7 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     try:
         live(node, executor, caught)
     finally:
-        end_within(ENDING, node.status)
+        node.owns_process = True
         executor.shutdown()
         node.destroy_node()
     return _ended(name, node.reason, node.status)

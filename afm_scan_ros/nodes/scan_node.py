@@ -18,6 +18,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.diagnostics import Diagnostics
+from afm_scan_ros.nodes.ending import end_within
 from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
@@ -33,6 +34,8 @@ INATTENTION = 0.2
 """Seconds of work without listening after which a node cannot tell who has been silent."""
 LINGER = 0.3
 """Seconds a node stays after its last word, so that the others hear it."""
+ENDING = 5
+"""Seconds in which a node leaves ROS, or its process ends without; usually 0.1."""
 NAMING = 0.2
 """Longest time, s, in which the name of a publisher's node follows on the publisher."""
 _UNNAMED = "_NODE_NAME_UNKNOWN_"
@@ -80,6 +83,7 @@ class ScanNode(Node, ABC):
         self.reason = "waits for scan_info"
         self.next_sample = 0
         self.status = 0
+        self.owns_process = False
         self.ready = False
         self._reported = 0
         self._logged = ""
@@ -353,6 +357,8 @@ class ScanNode(Node, ABC):
         if self._heartbeat.is_alive():
             self._heartbeat.join()
         self._readers.clear()
+        if self.owns_process:  # hardware and bag are closed by now
+            end_within(ENDING, self.status)
         super().destroy_node()
 
     def _log_news(self) -> None:
