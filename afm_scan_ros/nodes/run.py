@@ -27,10 +27,10 @@ from afm_scan_ros.nodes.topics import NODE_STATE
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NICENESS = -11
 """Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
-DISCOVERY = 4.0
+DISCOVERY = 7.0
 """Longest waits, s, for readers of the state of a node that cannot be made, and until they have it.
 
-Fast DDS tells of a node, where the first word was lost, once more after 3 s.
+Fast DDS tells of a node, where the first word was lost, once more after 3 s and after 6 s.
 """
 IDLE = 0.01
 """Longest wait for a message, and longest work on messages, s, before a node does its own work."""
