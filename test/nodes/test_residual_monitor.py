@@ -67,15 +67,11 @@ def scan(spec: Path, listener: Listener, start: Callable[..., NodeProcess]) -> S
             start(NAME, model_file=str(model), min_subscriptions=1, **PACE),
             start("piezoscanner_sim", **sim, min_true_subscriptions=0, **PACE),
             start("inversion_compensator", min_subscriptions=1 + watchers, **PACE),
-            start(
-                "trajectory_generator",
-                spec,
-                required_nodes=required,
-                time_scale=0.0,
-                min_subscriptions=1,
-                **PACE,
-            ),
         ]
+        # The scan waits for its own nodes, and not until a viewer knows them.
+        until(lambda: listener.count_publishers(MODEL_RESIDUAL.name), listener)
+        source = {"required_nodes": required, "time_scale": 0.0, "min_subscriptions": 1}
+        nodes.append(start("trajectory_generator", spec, **source, **PACE))
         until(lambda: all(node.process.poll() is not None for node in nodes), listener)
         return {node.name: node for node in nodes}
 
