@@ -131,7 +131,7 @@ class RelativeWeight:
     """A smooth weight for any scanner: its ``corner`` is so many times the first resonance.
 
     On the default plant, tracking 250 lines a second errs by less than 0.9 % for any corner from
-    4.4 to 15 (docs/evidence/accuracy.md); a larger one excites modes that the model lacks.
+    4.4 to 15 (``afm-scan bench tradeoff``); a larger one excites modes that the model lacks.
     """
 
     corner: float = field(default=11.0, converter=float, validator=gt(0.0))

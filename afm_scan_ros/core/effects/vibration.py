@@ -89,7 +89,7 @@ class VibrationModel:
         return complex(poles[np.abs(residues / poles.real).argmax()])
 
     @property
-    def bandwidth(self) -> float:
+    def natural_frequency(self) -> float:
         """Frequency (Hz) of the resonance that rises highest, or else of the slowest pole."""
         pole = self.resonant_pole
         slowest = np.abs(np.roots(self.denominator)).min() if pole is None else abs(pole)
@@ -211,7 +211,7 @@ class Vibration:
     def _weight(self) -> Weight:
         weight, chosen_for = self._design.weight, self._design.before or self._model
         if isinstance(weight, RelativeWeight):
-            weight = weight.at(chosen_for.bandwidth)
+            weight = weight.at(chosen_for.natural_frequency)
         if self._design.before is None:
             return weight
         response, before = self._system.response, held(chosen_for, self._sample_period).response
@@ -220,7 +220,7 @@ class Vibration:
     def _preview(self, kernel: Kernel, given: float | None) -> int:
         """Return the preview, samples; refuse one (s) that is too short."""
         if given is None:
-            least = round(PERIODS / (self._model.bandwidth * self._sample_period))
+            least = round(PERIODS / (self._model.natural_frequency * self._sample_period))
             return max(least, kernel.preview_needed(LARGEST_TAIL))
         preview = round(given / self._sample_period)
         if (tail := kernel.tail_ahead(preview)) > LARGEST_TAIL:

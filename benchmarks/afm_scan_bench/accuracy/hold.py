@@ -39,7 +39,7 @@ def held_error(sample_rate: float, *, hold: bool) -> float:
     spec = evolve(spec_at(LINE_RATE), samples_per_line=round(sample_rate / LINE_RATE))
     target = desired(spec, 0, total_samples(spec))
     vibration = Vibration(VIBRATION_X, spec.sample_period)
-    weight = RelativeWeight().at(VIBRATION_X.bandwidth)
+    weight = RelativeWeight().at(VIBRATION_X.natural_frequency)
     kernel = optimal_kernel(VIBRATION_X.response, weight, spec.sample_period)
     inverse = vibration.inverse if hold else OptimalInverse(kernel, 0)
     drive = inverse.invert_whole(target.x)

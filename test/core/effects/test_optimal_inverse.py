@@ -18,7 +18,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 MODEL = paper.vibration()
-WEIGHT = RelativeWeight().at(MODEL.bandwidth)
+WEIGHT = RelativeWeight().at(MODEL.natural_frequency)
 RANGE = 40e-6
 
 
