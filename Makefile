@@ -6,7 +6,9 @@ ROS := .venv-ros
 FLOOR_VERSIONS := .ci/ubuntu_24.04.txt
 # In the order that conftest.py gives: files of few tests are often long, and none of these comes
 # last so. Tests that wait for other processes leave room for a third worker on two cores.
-PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
+# A test that hangs fails after 15 minutes, with the stack of each thread.
+FILES := --dist loadfile --no-loadscope-reorder --timeout 900
+PARALLEL := -n 3 $(FILES)
 # The suite of the product; 'make check' runs the examples, 'make test-evidence' what takes long.
 SUITE := -m "not evidence" --ignore=test/test_docs.py --ignore=test/test_examples.py test
 FAULTS_ON_ROS := $(wildcard benchmarks/test/bench/test_*fault*.py benchmarks/test/bench/test_pipes.py) \
@@ -59,7 +61,7 @@ test-faults: $(ROS)/ready
 # Tests that need ROS are skipped without it. pytest fails where it finds no test. The cache of
 # compiled loops is this numba's own.
 pytest_on_ros = $(ROS)/run python -c "import rclpy, afm_scan_ros.msg" && \
-	  NUMBA_CACHE_DIR=$(CURDIR)/$(ROS)/numba $(ROS)/run python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(1)
+	  NUMBA_CACHE_DIR=$(CURDIR)/$(ROS)/numba $(ROS)/run python -m pytest -n 2 $(FILES) $(1)
 
 test-evidence: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence test

@@ -1,5 +1,6 @@
 """Workers that diagnose bags: processes of this machine, or those of a Dask cluster."""
 
+import asyncio
 import logging
 import os
 import signal
@@ -146,6 +147,18 @@ def _keeping_memory(work: Callable[[Task], Result], task: Task) -> Result:
     return work(task)
 
 
+async def _connect(address: str) -> None:
+    """Open a connection and close it.
+
+    A client that cannot connect is left half open. Where the garbage collector closes it while
+    another client starts, both wait for the lock of their event loops.
+    """
+    from distributed.comm.core import connect  # noqa: PLC0415 - of an extra
+
+    connection = await connect(address, timeout=PATIENCE)
+    await connection.close()
+
+
 def on_cluster(
     work: Callable[[Task], Result], tasks: Sequence[Task], address: str
 ) -> Iterator[Outcome[Task, Result]]:
@@ -157,13 +170,13 @@ def on_cluster(
     from distributed import Client, as_completed  # noqa: PLC0415 - of an extra
 
     try:
-        client = Client(address, timeout=PATIENCE)
+        asyncio.run(_connect(address))
     except (OSError, ValueError) as error:
         raise InputError(
             f"--scheduler {address}: no Dask scheduler answers there: start it with 'dask"
             f" scheduler' ({type(error).__name__})"
         ) from error
-    with client:
+    with Client(address, timeout=PATIENCE) as client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:

@@ -1,5 +1,6 @@
 """Workers: each task has one outcome, whatever becomes of the process that works on it."""
 
+import gc
 import os
 import signal
 import time
@@ -10,7 +11,7 @@ from resource import RUSAGE_SELF, getrusage
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.survey import workers
@@ -138,6 +139,9 @@ def test_a_scheduler_that_does_not_answer_is_named(
     said = f"--scheduler {address}: no Dask scheduler answers there"
     with pytest.raises(InputError, match=said):
         list(on_cluster(pid, [1], address))
+    # The garbage collector would close one while the next test's starts, and both would hang.
+    clients = [thing for thing in gc.get_objects() if type(thing) is Client]
+    assert {client.status for client in clients} <= {"closed"}
 
 
 def test_a_scheduler_without_workers_is_not_waited_for_without_end(
