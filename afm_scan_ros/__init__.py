@@ -10,7 +10,6 @@ __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 if TYPE_CHECKING:
     from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.api.identification import identify
-    from afm_scan_ros.api.learning import Learned, learn
     from afm_scan_ros.api.model import Model, load_model, trajectory
     from afm_scan_ros.api.record import Record, read_record
     from afm_scan_ros.core.errors import InputError, ScanError
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
         identify_from_images,
     )
     from afm_scan_ros.features.images.scan_image import ScanImage
+    from afm_scan_ros.features.learning.measured import Learned, learn
 
     __version__: str
 
@@ -54,7 +54,7 @@ _MODULES = {
     "DriveLimits": "core.limits",
     "ImageIdentification": "features.images.identify",
     "InputError": "core.errors",
-    "Learned": "api.learning",
+    "Learned": "features.learning.measured",
     "Model": "api.model",
     "Record": "api.record",
     "ScanError": "core.errors",
@@ -64,7 +64,7 @@ _MODULES = {
     "diagnose": "api.diagnosis",
     "identify": "api.identification",
     "identify_from_images": "features.images.identify",
-    "learn": "api.learning",
+    "learn": "features.learning.measured",
     "load_model": "api.model",
     "read_image": "features.images.files.formats",
     "read_record": "api.record",

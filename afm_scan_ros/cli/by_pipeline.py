@@ -21,7 +21,7 @@ from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
 from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.learning.adaptation import Adaptation
+from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings

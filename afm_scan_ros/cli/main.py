@@ -23,7 +23,6 @@ COMMANDS = {
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
     "adapt": "Accept into the model what changed in the scanner during a scan.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
-    "learn": "Repeat a scan and learn its reference from the measured errors.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
     "run": "Run one node, with the arguments of 'ros2 run afm_scan_ros'.",
@@ -33,10 +32,8 @@ COMMANDS = {
 MODULES = {
     "adapt": "recorded",
     "analyze": "recorded",
-    "close-loop": "loops",
     "diagnose": "recorded",
     "invert": "import_csv",
-    "learn": "loops",
 }
 """Modules of the commands that do not stand in one of their name."""
 

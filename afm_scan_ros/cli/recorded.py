@@ -27,10 +27,10 @@ from afm_scan_ros.cli.options import (
 )
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.online import TIME_CONSTANT
+from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import model_file

@@ -31,12 +31,12 @@ from afm_scan_ros.cli.scanner import (
     time_scale_option,
 )
 from afm_scan_ros.cli.ways import scan_as_ordered
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.adapted_scan import refuse_without_turns
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.line_feedback import refuse_unsuited
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
+from afm_scan_ros.core.online.adapted_scan import refuse_without_turns
+from afm_scan_ros.core.online.line_feedback import refuse_unsuited
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model

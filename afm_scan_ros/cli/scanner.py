@@ -14,10 +14,10 @@ from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
-from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.correction import Correction, Stop
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import SampleError, ScanError
-from afm_scan_ros.core.learning.correction import Correction, Stop
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import SMALLEST_RANGE, ScanSpec

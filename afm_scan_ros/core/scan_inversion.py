@@ -7,14 +7,14 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.compensation import Compensation, Ranges, largest_ranges, preflight
+from afm_scan_ros.core.correction import Correction, Stop
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
-from afm_scan_ros.core.learning.correction import Correction, Stop
-from afm_scan_ros.core.learning.line_feedback import LEAD, FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.online import TIME_CONSTANT
+from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.online.adapted_scan import AdaptedScan
+from afm_scan_ros.core.online.line_feedback import LEAD, FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import MAX_BLOCK, cut, end
 from afm_scan_ros.core.trajectory import desired

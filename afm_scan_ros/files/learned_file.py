@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from attrs import asdict, frozen
 
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES

@@ -10,10 +10,10 @@ from attrs import Attribute, frozen
 from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.line_feedback import LEAD
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
+from afm_scan_ros.core.online import TIME_CONSTANT
+from afm_scan_ros.core.online.line_feedback import LEAD
 from afm_scan_ros.core.scan_inversion import InversionSettings
 from afm_scan_ros.core.scan_spec import human_name, scan_parameters
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings

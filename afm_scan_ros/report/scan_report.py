@@ -6,11 +6,11 @@ from typing import TypeAlias
 from attrs import frozen
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.learning.adaptation import CREEP_NAME, AxisState, Outcome
-from afm_scan_ros.core.learning.adapted_reference import AxisShift
 from afm_scan_ros.core.metrics import AxisError, Tracking
 from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.online.adaptation import CREEP_NAME, AxisState, Outcome
+from afm_scan_ros.core.online.adapted_reference import AxisShift
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
 from afm_scan_ros.report.quantity import nanometres, percent

@@ -17,7 +17,7 @@ from afm_scan_bench.learning.repeated import repeated
 from afm_scan_bench.learning.rivals import eiic, learned, miic, p_type
 from afm_scan_bench.mechanisms.product_sizes import sized
 from afm_scan_bench.scans import default_plant, spec_at
-from afm_scan_ros.core.learning.correction import window
+from afm_scan_ros.core.correction import window
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.simulation.axis import HysteresisSpec

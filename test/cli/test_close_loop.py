@@ -10,8 +10,8 @@ from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import loops as command
-from afm_scan_ros.cli.loops import RecordedSession
+from afm_scan_ros.cli import close_loop as command
+from afm_scan_ros.cli.session import RecordedSession
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError

@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.calibrate import calibrate
+from afm_scan_ros.cli.close_loop import close_loop
 from afm_scan_ros.cli.driving import DrivenScanner
-from afm_scan_ros.cli.loops import close_loop, learn
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scan import scan
 from afm_scan_ros.cli.scanner import driver_and_file
@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, res
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import load_settings
 from afm_scan_ros.drivers.files import FileExchange
+from afm_scan_ros.features.learning.learn_command import learn
 from helpers import in_process
 from helpers.in_process import default_plant, drive_through
 from helpers.lab import METRES_PER_VOLT

@@ -8,8 +8,8 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.files.learned_file import load_learned, save_learned

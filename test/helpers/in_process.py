@@ -6,11 +6,11 @@ from functools import cache
 from attrs import define, field
 
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec

@@ -16,12 +16,12 @@ from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
-from afm_scan_ros.cli.loops import learn
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.learn_command import learn
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import save_scan
 from helpers.in_process import default_plant, drive_through

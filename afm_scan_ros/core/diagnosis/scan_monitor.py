@@ -13,8 +13,8 @@ from afm_scan_ros.core.diagnosis.monitor import (
     expected_limits,
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.learning.adaptation import EXPECTED, Adaptation, AxisState
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.online.adaptation import EXPECTED, Adaptation, AxisState
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.streams import ACHIEVED, DRIVE, Aligner, LineError

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
-from afm_scan_ros.cli.loops import RecordedSession
 from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.session import RecordedSession
 from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose

@@ -13,10 +13,10 @@ from attrs import evolve, frozen
 from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, spec_at
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.online import TIME_CONSTANT
+from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.online.adapted_scan import AdaptedScan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import Aligner, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds

@@ -7,9 +7,9 @@ import numpy as np
 
 from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.line_feedback import FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.online.line_feedback import FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end
 from afm_scan_ros.core.trajectory import desired, total_samples

@@ -13,8 +13,8 @@ from afm_scan_bench.detune import detuned
 from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.scans import default_plant, rms_percent, spec_at, tracking
 from afm_scan_ros.core.comparison import RELEVANT_CHANGE, rms_of
-from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.table import Row, Table
 
 COLUMNS = {

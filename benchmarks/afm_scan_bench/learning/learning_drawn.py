@@ -10,9 +10,9 @@ from afm_scan_bench.scans import default_plant, spec_at, tracking
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.comparison import RELEVANT_CHANGE, rms_of
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.axis import (
     AxisSpec,

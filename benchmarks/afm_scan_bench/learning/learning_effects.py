@@ -13,7 +13,7 @@ from afm_scan_bench.mechanisms.product_sizes import EFFECTS, sized
 from afm_scan_bench.scans import default_plant, spec_at
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning.loop import LearningScan, best_of
+from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.table import Row, Table
 
 AXIS = "x"

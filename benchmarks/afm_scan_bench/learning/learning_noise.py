@@ -15,7 +15,7 @@ from afm_scan_bench.learning.learning import error_percent
 from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.scans import default_plant, spec_at
 from afm_scan_ros.core.comparison import RELEVANT_CHANGE
-from afm_scan_ros.core.learning.loop import LearningScan
+from afm_scan_ros.features.learning.loop import LearningScan
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.scanner import PlantSpec
 

@@ -10,11 +10,11 @@ from numpy.random import Generator, default_rng
 from afm_scan_bench.scans import ALL, default_model, default_plant
 from afm_scan_bench.speed.timing.ratios import COLUMNS, by_turns, processor_seconds, row
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.scan_to_scan import AxisLearning, TrialSpectra
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.learning.scan_to_scan import AxisLearning, TrialSpectra
 from afm_scan_ros.report.table import Table
 
 SPEC = ScanSpec(lines=256, line_rate=5.0, samples_per_line=3904)

@@ -12,12 +12,12 @@ from attrs import evolve
 from afm_scan_bench.detune import detuned
 from afm_scan_bench.learning.repeated import RepeatingScanner, repeated
 from afm_scan_bench.scans import default_model, default_plant, rms_percent, spec_at, tracking
+from afm_scan_ros.core.correction import Correction, window
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning.correction import Correction, window
-from afm_scan_ros.core.learning.loop import best_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.learning.loop import best_of
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.scanner import PlantSpec
 

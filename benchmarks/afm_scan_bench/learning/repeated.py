@@ -4,13 +4,13 @@ from attrs import define, field
 
 from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.loop import LearningScan, learn
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.features.learning.loop import LearningScan, learn
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SCANS = 6

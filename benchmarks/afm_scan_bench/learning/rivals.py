@@ -16,13 +16,13 @@ from attrs import frozen
 from afm_scan_bench.learning.repeated import RepeatingScanner
 from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.comparison import rms_of
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.resonance_shift import ScanSpectra, Spectrum
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.learning.resonance_shift import ScanSpectra, Spectrum
 from afm_scan_ros.simulation.scanner import PlantSpec
 
 SHARES = (0.25, 0.5, 1.0)

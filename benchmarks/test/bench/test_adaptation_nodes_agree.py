@@ -14,10 +14,10 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.learning.adaptation import Adaptation
-from afm_scan_ros.core.learning.adapted_scan import AdaptedScan
-from afm_scan_ros.core.learning.line_feedback import lines_of_delay
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.online.adapted_scan import AdaptedScan
+from afm_scan_ros.core.online.line_feedback import lines_of_delay
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.files import share_directory

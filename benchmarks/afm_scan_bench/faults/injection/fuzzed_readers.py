@@ -15,7 +15,7 @@ from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.outcome import Tally
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
-from afm_scan_ros.core.learning.correction import Correction
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import load_settings

@@ -9,10 +9,10 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.learning.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, AxisModel
+from afm_scan_ros.core.online.adaptation import Adaptation, AxisState, Outcome
+from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.learning.extrapolation import (
+from afm_scan_ros.core.online.extrapolation import (
     DEGREES,
     LARGEST_GAIN_ERROR,
     LARGEST_SUM,

@@ -9,10 +9,10 @@ from attrs import frozen
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
-from afm_scan_ros.core.learning.loop import LearningScan, best_of
 from afm_scan_ros.core.metrics import Figure as ErrorFigure
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text

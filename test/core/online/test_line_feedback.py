@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.line_feedback import (
+from afm_scan_ros.core.online.line_feedback import (
     CENTRE_X,
     CENTRE_Y,
     FedBack,

@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples, whole
 from afm_scan_ros.api.model import UNLIMITED, Model
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.loop import LearningScan, best_of
-from afm_scan_ros.core.learning.loop import learn as learning_scans
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace
+from afm_scan_ros.features.learning.loop import SCANS, LearningScan, best_of
+from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.paths import path_of
 
@@ -66,7 +66,7 @@ def learn(
     model: Model,
     spec: ScanSpec,
     measure: Measure,
-    scans: int = 6,
+    scans: int = SCANS,
     limits: DriveLimits | None = None,
     progress: ProgressCallback | None = None,
 ) -> Learned:

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.learning.adapted_reference import ResonanceParts, SlowSection
 from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.online.adapted_reference import ResonanceParts, SlowSection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import Prediction
 from afm_scan_ros.core.streams import WholeLines

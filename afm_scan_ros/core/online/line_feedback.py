@@ -21,7 +21,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.extrapolation import Extrapolation, Known
+from afm_scan_ros.core.online.extrapolation import Extrapolation, Known
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, ErrorLines, end, part
 from afm_scan_ros.core.trajectory import TO_AND_FRO, desired, phases, sample_kinds, smooth_step

@@ -25,23 +25,23 @@ from scipy.special import ndtri
 
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
-from afm_scan_ros.core.learning import TIME_CONSTANT
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, room, slowest
-from afm_scan_ros.core.learning.line_signals import (
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.online import TIME_CONSTANT
+from afm_scan_ros.core.online.adapted_reference import AxisShift, room, slowest
+from afm_scan_ros.core.online.line_signals import (
     GAIN,
     HYSTERESIS,
     UNKNOWNS,
     LineSignals,
     ScanSignals,
 )
-from afm_scan_ros.core.learning.shift_estimate import (
+from afm_scan_ros.core.online.shift_estimate import (
     CreepInformation,
     Information,
     LineInformation,
     ShiftEstimate,
     estimate,
 )
-from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
 

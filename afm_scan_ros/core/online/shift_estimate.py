@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.bands import bounds, coefficients
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adapted_reference import room
-from afm_scan_ros.core.learning.line_signals import GAIN, HYSTERESIS, UNKNOWNS, LineSignals
+from afm_scan_ros.core.online.adapted_reference import room
+from afm_scan_ros.core.online.line_signals import GAIN, HYSTERESIS, UNKNOWNS, LineSignals
 from afm_scan_ros.core.types import Array
 
 ROOM = np.append(room()[:HYSTERESIS], 1.0)

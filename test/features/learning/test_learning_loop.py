@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from attrs import define, evolve, field
 
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.loop import LearningScan, best_of, lacking, learn
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.features.learning.loop import LearningScan, best_of, lacking, learn
 from afm_scan_ros.simulation.axis import detuned_axis
 from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers.in_process import InProcessSession, default_model, default_plant

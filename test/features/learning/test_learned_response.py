@@ -6,7 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.learning.resonance_shift import (
+from afm_scan_ros.core.model import ModelDiscrepancy
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.learning.resonance_shift import (
     ModelError,
     ScanSpectra,
     Shift,
@@ -15,10 +18,11 @@ from afm_scan_ros.core.learning.resonance_shift import (
     fitted_shift,
     local_mean,
 )
-from afm_scan_ros.core.learning.response import MotionSpectra, estimated_response, relative_error
-from afm_scan_ros.core.model import ModelDiscrepancy
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.learning.response import (
+    MotionSpectra,
+    estimated_response,
+    relative_error,
+)
 from helpers.in_process import default_model
 
 VIBRATION = default_model().x.vibration

@@ -13,7 +13,9 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.learning.resonance_shift import (
+from afm_scan_ros.core.model import VIBRATING, ModelDiscrepancy
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.learning.resonance_shift import (
     LOCAL,
     ModelError,
     Spectrum,
@@ -21,8 +23,6 @@ from afm_scan_ros.core.learning.resonance_shift import (
     fitted_shift,
     local_mean,
 )
-from afm_scan_ros.core.model import VIBRATING, ModelDiscrepancy
-from afm_scan_ros.core.types import Array
 
 LINE_RATES = 3
 """Width, in line rates, of a band that holds harmonics with and without motion."""

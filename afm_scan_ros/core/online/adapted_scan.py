@@ -8,9 +8,9 @@ import numpy as np
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter
-from afm_scan_ros.core.learning.line_feedback import CorrectedLines, turn_samples
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilter
+from afm_scan_ros.core.online.line_feedback import CorrectedLines, turn_samples
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import Aligner, end, part
 from afm_scan_ros.core.trajectory import TO_AND_FRO, smooth_step

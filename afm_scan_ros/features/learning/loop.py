@@ -9,15 +9,9 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.compensation import Compensation
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.learning.correction import Correction
-from afm_scan_ros.core.learning.scan_to_scan import (
-    AxisLearning,
-    Convergence,
-    LearningStep,
-    TrialSpectra,
-)
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
@@ -25,9 +19,15 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.scan_to_scan import (
+    AxisLearning,
+    Convergence,
+    LearningStep,
+    TrialSpectra,
+)
 
-FEWEST = 3
-"""Scans: two of one drive, which show what repeats, and one with a correction."""
+FEWEST, SCANS = 3, 6
+"""Scans: two of one drive, which show what repeats, and one with a correction; by default."""
 PRICES = 13
 """Prices of the drive that are tried, from none that counts to one that leaves no correction."""
 

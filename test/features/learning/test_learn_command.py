@@ -10,13 +10,13 @@ from attrs import define
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import loops as command
 from afm_scan_ros.cli.main import cli
+from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.learning.correction import Correction
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.features.learning import learn_command as command
 from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.plant_file import load_plant

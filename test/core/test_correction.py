@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from afm_scan_ros.core.correction import Correction, Stop, window
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.correction import Correction, Stop, window
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total, total_samples
 from afm_scan_ros.core.types import Array, Trace

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.learning.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import CreepModel, ScannerModel
+from afm_scan_ros.core.online.adaptation import Adaptation, AxisState, Outcome
+from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array

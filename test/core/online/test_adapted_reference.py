@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.learning.adapted_reference import AxisShift, ReferenceFilter, with_shift
-from afm_scan_ros.core.learning.adapted_scan import AdaptedScan, refuse_without_turns
+from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilter, with_shift
+from afm_scan_ros.core.online.adapted_scan import AdaptedScan, refuse_without_turns
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.streams import end, part

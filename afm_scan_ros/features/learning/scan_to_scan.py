@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.comparison import RELEVANT_CHANGE
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.learning.resonance_shift import (
+from afm_scan_ros.core.metrics import METRES
+from afm_scan_ros.core.model import AxisModel, InverseSettings
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.learning.resonance_shift import (
     LOCAL,
     ScanSpectra,
     Spectrum,
@@ -23,17 +28,12 @@ from afm_scan_ros.core.learning.resonance_shift import (
     band_mean,
     local_mean,
 )
-from afm_scan_ros.core.learning.response import (
+from afm_scan_ros.features.learning.response import (
     MotionSpectra,
     RelativeResponse,
     estimated_response,
     relative_error,
 )
-from afm_scan_ros.core.metrics import METRES
-from afm_scan_ros.core.model import AxisModel, InverseSettings
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array
 
 UNCERTAIN = 0.05
 """Largest probability with which a frequency that is learned does not converge."""

@@ -1,0 +1,132 @@
+"""``afm-scan learn``: repeat a scan, and learn a correction of its reference."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
+from afm_scan_ros.cli.scan import drive_limits_of
+from afm_scan_ros.cli.scanner import scanner_options, seed_option, time_scale_option
+from afm_scan_ros.cli.session import RecordedSession
+from afm_scan_ros.core.diagnosis.diagnosis import diagnose
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.types import AXES
+from afm_scan_ros.features.learning.loop import (
+    FEWEST,
+    SCANS,
+    LearningScan,
+    best_of,
+    lacking,
+    observations,
+)
+from afm_scan_ros.features.learning.loop import learn as learning_scans
+from afm_scan_ros.features.learning.report import (
+    Taught,
+    learning_document,
+    learning_page,
+    learning_text,
+    taught_text,
+)
+from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.model_file import load_model, save_model
+from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.files.plant_file import load_scan
+from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.report.diagnosis_json import save_diagnosis
+from afm_scan_ros.report.html import Provenance, heading_lines, provenance_of
+from afm_scan_ros.report.table import show
+from afm_scan_ros.report.terminal import say
+
+HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
+
+
+@click.command()
+@click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
+@click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
+@scanner_options
+@click.option(
+    "--scans",
+    type=click.IntRange(min=FEWEST),
+    default=SCANS,
+    show_default=True,
+    help="Number of scans; the first two have no correction.",
+)
+@click.option(
+    "--out", required=True, type=FOLDER, help="Folder for learned.npz, report.html, bags."
+)
+@click.option(
+    "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
+)
+@seed_option
+@time_scale_option
+def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
+    spec: Path,
+    model: Path,
+    plant: Path,
+    scanner: str,
+    scans: int,
+    out: Path,
+    seed: int,
+    time_scale: float | None,
+    *,
+    diagnosed: bool,
+) -> None:
+    """Repeat a scan, and learn a correction of its reference from the measured errors.
+
+    learned.npz holds the correction of the best scan. 'afm-scan scan --learned' uses it. It
+    belongs to this scan and this model.
+    """
+    base = load_model(model)
+    for axis in AXES:
+        base.axis(axis)
+    wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
+    limits = drive_limits_of(scanner, plant)
+    refuse_existing(out / "bags")
+    session = RecordedSession(plant, out, seed, scanner, time_scale)
+    done: list[LearningScan] = []
+    failure, ended = "", None
+    try:
+        for each in learning_scans(session, base, wanted, scans, limits):
+            done.append(each)
+            errors = ", ".join(f"{axis} {1e9 * each.errors[axis]:.1f} nm" for axis in AXES)
+            say(f"scan {len(done)} of {scans}: measured error, rms: {errors}")
+    except (InputError, ScanError, KeyboardInterrupt) as error:
+        if not done:
+            raise
+        ended = error
+        failure = str(error) or "interrupted"
+    made = provenance_of(model, base, session.sources, datetime.now(UTC))
+    save_learned(out / "learned.npz", best_of(done).correction, base)
+    _write(out, done, None, made, failure)
+    show(learning_text(done))
+    if diagnosed and not failure:
+        taught = _taught(base, done, out, made)
+        _write(out, done, taught, made, failure)
+        show(taught_text(taught))
+    say(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
+    if isinstance(ended, KeyboardInterrupt):
+        raise ended
+    if failure:
+        raise ScanError(f"learning ended after {len(done)} scans: {failure}")
+
+
+def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Provenance) -> Taught:
+    """Diagnose the first scan and the learned one together."""
+    with working("diagnosing") as progress:
+        found = diagnose(model, observations(done), progress)
+    best = best_of(done)
+    head = f"{HEADING}\n{heading_lines(of)}"
+    save_model(out / "model.extended.yaml", found.model, head)
+    return Taught(found, lacking(model, best), lacking(found.model, best))
+
+
+def _write(
+    out: Path, done: list[LearningScan], taught: Taught | None, of: Provenance, failure: str
+) -> None:
+    """Write what was learned; ``failure`` is what ended it, if any."""
+    document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
+    save_diagnosis(out / "learning.json", document)
+    write_text(out / "report.html", learning_page(done, taught, of, failure))
