@@ -30,19 +30,10 @@ from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.guarded import Displacement
 from afm_scan_ros.drivers.link import DriverTimeouts
+from afm_scan_ros.drivers.safety import SafetySettings
 
 COMPENSATOR, RECORDER, MONITOR = "inversion_compensator", "scan_recorder", "residual_monitor"
 """Parts of a scan that errors name, as the nodes that do the same."""
-AHEAD = 0.05
-"""Longest drive (s) given to the driver at once: it is output even if this process is gone."""
-IDLE = 0.01
-"""Longest wait (s) before this process looks at everything again."""
-OPENING = 60.0
-"""Longest time (s) that a driver may take to open or to start."""
-HELD = 0.3
-"""Longest time (s) for which the outputs of a real scanner are held after a silence."""
-SIMULATED = DriverTimeouts(3.0, OPENING, OPENING, OPENING, real_time=False)
-"""Of a simulation: only minutes are at stake, and a block may take long."""
 TRACEBACK = "Traceback (most recent call last)"
 UNWRITTEN = 500
 """Blocks that wait to be written at most."""
@@ -68,6 +59,7 @@ class ScanChain:
     inversion: ScanInversion | None = None
     preflight: int = 0
     monitor: ScanMonitor | None = None
+    safety: SafetySettings = field(factory=SafetySettings)
 
 
 def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
@@ -78,7 +70,7 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
     """
     interrupted: list[int] = []
     with _handling(signal.default_int_handler), TemporaryFile("w+", encoding="utf-8") as output:
-        driver = DriverProcess(chain.driver, _timeouts(chain.time_scale), output)
+        driver = DriverProcess(chain.driver, _timeouts(chain), output)
         try:
             with _ramping_down(chain, driver):
                 _prepare(chain, driver, listener)
@@ -101,11 +93,13 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
         raise ScanError(f"{chain.scanner}: {trouble}")
 
 
-def _timeouts(time_scale: float) -> DriverTimeouts:
+def _timeouts(chain: ScanChain) -> DriverTimeouts:
     """Return how long the driver's process waits; at a slower pace drive comes less often."""
-    if not time_scale:
-        return SIMULATED
-    return DriverTimeouts(HELD, HELD * max(1.0, time_scale), OPENING, HELD, real_time=True)
+    times, opening = chain.safety, chain.safety.opening
+    if not chain.time_scale:
+        return DriverTimeouts(times.simulated, opening, opening, opening, real_time=False)
+    starved = times.held * max(1.0, chain.time_scale)
+    return DriverTimeouts(times.held, starved, opening, times.held, real_time=True)
 
 
 def _prepare(chain: ScanChain, driver: DriverProcess, listener: ScanListener) -> None:
@@ -119,7 +113,7 @@ def _prepare(chain: ScanChain, driver: DriverProcess, listener: ScanListener) ->
     listener.doing("waits for the driver to start")
     with _part(chain.scanner):
         while driver.waiting:
-            driver.answer(IDLE)
+            driver.answer(chain.safety.idle)
 
 
 @define(eq=False)
@@ -144,7 +138,7 @@ class _Flow:
             if self._interrupted:
                 raise KeyboardInterrupt
             self._move_on()
-            self._take(0.0 if self._compute() else IDLE)
+            self._take(0.0 if self._compute() else self._chain.safety.idle)
             while self._unwritten and self._unwritten[0].done():
                 self._unwritten.popleft().result()
         for written in self._unwritten:
@@ -179,7 +173,7 @@ class _Flow:
             return
         self._moving = [self._queue.popleft()]
         count, period = self._moving[0].x.size, self._chain.info.sample_period
-        most = min(MAX_BLOCK, AHEAD / period)
+        most = min(MAX_BLOCK, self._chain.safety.ahead / period)
         while self._queue and (count := count + self._queue[0].x.size) <= most:
             self._moving.append(self._queue.popleft())
         x, y = (np.concatenate([each.axis(axis) for each in self._moving]) for axis in AXES)

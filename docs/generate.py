@@ -24,6 +24,7 @@ from afm_scan_ros.nodes import NODES as NODE_NAMES
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
 from names_of_ros import names_of_ros
+from settings_page import settings_page
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
@@ -373,6 +374,7 @@ PAGES = {
     "reference/api.md": api,
     "reference/commands.md": commands,
     "reference/nodes.md": nodes,
+    "reference/settings.md": settings_page,
     "reference/messages.md": messages,
     "reference/files.md": files_of_users,
 }

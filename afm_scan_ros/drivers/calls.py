@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from threading import Lock, Timer
 
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.drivers.link import ENDING
 
 PRIORITY = 10
 """Real-time priority, of 1 to 99: above all usual work, below the kernel's for devices, 50."""
@@ -30,13 +29,13 @@ def ending_after(seconds: float) -> Iterator[None]:
 
 
 @contextmanager
-def bounded(call: str, seconds: float) -> Iterator[None]:
+def bounded(call: str, seconds: float, rest: float) -> Iterator[None]:
     """Raise ScanError where a call of the driver has returned late.
 
-    One that has not returned ENDING s after its bound is taken to hang, and the process ends.
+    One that has not returned ``rest`` s after its bound is taken to hang, and the process ends.
     """
     begun = time.monotonic()
-    with ending_after(seconds + ENDING):
+    with ending_after(seconds + rest):
         yield
     if (taken := time.monotonic() - begun) > seconds:
         raise ScanError(f"{call} of the driver took {taken:.3g} s, and may take {seconds:.3g} s")

@@ -20,7 +20,6 @@ from afm_scan_ros.drivers.link import (
     ALIVE,
     DRIVE,
     ENDED,
-    ENDING,
     OPEN,
     OPENED,
     START,
@@ -32,9 +31,6 @@ from afm_scan_ros.drivers.link import (
     ramp_bound,
 )
 from afm_scan_ros.files.records import to_mapping
-
-SIGN_OF_LIFE = 0.05
-"""Seconds between two signs of life, where no block says that the ROS side is there."""
 
 _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.argv[1]))"
 
@@ -73,7 +69,7 @@ class DriverProcess:
                 start_new_session=True,
             )
         self._link = Link(ours)
-        self._link.patience = ENDING
+        self._link.patience = self._waits.rest
         self._ask_to_open(choice)
 
     def opened(self) -> Self:
@@ -144,12 +140,13 @@ class DriverProcess:
     def ramp_down(self, why: str) -> str:
         """Bring the outputs to rest, end the driver, and return why and how, within seconds.
 
-        A block that is late may be answered within ENDING, and the ramp begins then. Where the
+        A block that is late may be answered within ``rest``, and the ramp begins then. Where the
         driver has ended already, that is what is returned.
         """
         latency = self.latency_samples * self._period
-        return_of_block = ENDING if self.waiting and self._block else 0.0
-        deadline = time.monotonic() + return_of_block + ramp_bound(self._settings, latency)
+        return_of_block = self._waits.rest if self.waiting and self._block else 0.0
+        ramp = ramp_bound(self._settings, latency, self._waits.rest)
+        deadline = time.monotonic() + return_of_block + ramp
         with suppress(InputError, ScanError):
             self._send(Message(STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
@@ -165,7 +162,7 @@ class DriverProcess:
         outcome = self.ramp_down("the scan has ended")
         self._link.close()
         try:
-            self._process.wait(ENDING)
+            self._process.wait(self._waits.rest)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -197,7 +194,7 @@ class DriverProcess:
         except OSError:  # it has ended: what it said last tells why
             while True:
                 self._take()
-        self._next_sign = time.monotonic() + SIGN_OF_LIFE
+        self._next_sign = time.monotonic() + self._waits.sign_of_life
 
     def _take(self, why: str = "") -> Message:
         """Return the next message; raises the error with which the driver has ended.
@@ -236,7 +233,7 @@ class DriverProcess:
     def _fate(self) -> str:
         """Describe how the process that closed its end of the link has ended."""
         try:
-            status = -self._process.wait(ENDING)
+            status = -self._process.wait(self._waits.rest)
         except subprocess.TimeoutExpired:
             return "the driver's process hangs"
         if status == signal.SIGALRM:

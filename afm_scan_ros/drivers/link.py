@@ -17,6 +17,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.drivers import ScannerSettings
+from afm_scan_ros.drivers.safety import SafetySettings
 
 OPEN, START, DRIVE, ALIVE, STOP = "open", "start", "drive", "alive", "stop"
 """What the ROS process asks for, or, with ALIVE, that it is there."""
@@ -95,14 +96,6 @@ class Link:
         return data
 
 
-ENDING = 3.0
-"""Longest time (s), beside the ramp itself, for the outputs to be at rest.
-
-A call of the driver that is late may still return within it, and is followed by the ramp. Then its
-process is killed, which holds the outputs where they are, but frees the device for its watchdog.
-"""
-
-
 @frozen
 class DriverTimeouts:
     """Longest waits (s), and whether a scan runs in ``real_time``, so that its driver has priority.
@@ -111,6 +104,8 @@ class DriverTimeouts:
     where no more drive has come for ``starved`` since the last block would have been output: signs
     of life do not count. ``opening`` bounds the driver's constructor, and its ``start``, which set
     up hardware. An answer to a block may come ``answer`` after the block and its readings are due.
+    ``rest`` is what may pass beside the ramp itself until the outputs are at rest, and
+    ``sign_of_life`` the time between two signs of the ROS side.
 
     In real time the outputs are to be at rest within 0.5 s of a fault. The longest ramp of the
     amplifier's settings, as 0.125 s from 5 V at 40 V/s, and some 0.05 s for the process to run
@@ -125,19 +120,21 @@ class DriverTimeouts:
     opening: float
     answer: float
     real_time: bool
+    rest: float = SafetySettings().rest
+    sign_of_life: float = SafetySettings().sign_of_life
 
     def for_answer(self, block: Trace, latency_samples: int) -> float:
         """Longest time (s) that the driver may take for a block, with its late readings."""
         return (block.x.size + latency_samples) * block.sample_period + self.answer
 
 
-def ramp_bound(settings: ScannerSettings, late: float) -> float:
+def ramp_bound(settings: ScannerSettings, late: float, rest: float) -> float:
     """Longest time (s) that a ramp to rest may take, from any drive within the limits.
 
     Before it the driver outputs what is in its buffer, whose readings come ``late`` (s): twice
-    that at most.
+    that at most. ``rest`` (s) is what the process may take beside that.
     """
-    return settings.amplifier.longest_ramp + 2.0 * late + ENDING
+    return settings.amplifier.longest_ramp + 2.0 * late + rest
 
 
 def late(seconds: float) -> str:

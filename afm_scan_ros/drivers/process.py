@@ -27,7 +27,6 @@ from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
 from afm_scan_ros.drivers.link import (
     DRIVE,
     ENDED,
-    ENDING,
     MOVED,
     OPENED,
     START,
@@ -39,6 +38,7 @@ from afm_scan_ros.drivers.link import (
     late,
     ramp_bound,
 )
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.drivers.words import described, printable, refusing
 from afm_scan_ros.files.records import from_mapping
 
@@ -88,7 +88,7 @@ class DriverHost:
         name = asked["driver"]
         if name not in OURS:
             sys.path.append(os.getcwd())  # noqa: PTH109 - last, so that it hides no module
-        with refusing(f"driver {name}"), bounded("__init__", self._waits.opening):
+        with refusing(f"driver {name}"), bounded("__init__", self._waits.opening, self._waits.rest):
             self._driver = GuardedDriver(name, self._settings, asked["options"], where)
         self._answer(Message(OPENED, {"knows_true": self._driver.knows_true}))
         while (message := self._next()).kind != STOP:
@@ -98,7 +98,10 @@ class DriverHost:
                 self._move(self._driver, message)
 
     def _start(self, driver: GuardedDriver, sample_period: float) -> None:
-        with refusing("the driver does not start"), bounded("start", self._waits.opening):
+        with (
+            refusing("the driver does not start"),
+            bounded("start", self._waits.opening, self._waits.rest),
+        ):
             driver.start(sample_period)
             self._started, self._late = True, driver.latency_samples * sample_period
         gc.collect()
@@ -124,7 +127,7 @@ class DriverHost:
         """Let the driver advance; where it is late, ramp down meanwhile if that can be."""
         bound = self._waits.for_answer(block, driver.latency_samples)
         if not driver.ramps_while_blocked:
-            with bounded("advance", bound):
+            with bounded("advance", bound, self._waits.rest):
                 return driver.advance(block, last=last)
 
         def take_over() -> None:
@@ -163,7 +166,7 @@ class DriverHost:
 
     def _report(self, why: str, ramp: float | str, *, bad_input: bool = False) -> None:
         """Report why the work has ended, and how long the ramp took (s) or why it failed."""
-        self._link.patience = ENDING
+        self._link.patience = SafetySettings().rest
         said = printable(ramp) if isinstance(ramp, str) else ramp
         with suppress(OSError):  # nobody may be left to hear it
             fields = {"why": printable(why), "bad_input": bad_input, "ramp": said}
@@ -171,7 +174,7 @@ class DriverHost:
 
     @property
     def _ramp_bound(self) -> float:
-        return ramp_bound(self._settings, self._late)
+        return ramp_bound(self._settings, self._late, self._waits.rest)
 
     def _ramp_down(self) -> float | str:
         """Bring the outputs to rest; return how long it took (s), or why they may not be."""

@@ -17,7 +17,7 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
-from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST, ScanNode
+from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
 
@@ -246,7 +246,7 @@ class StreamReader(BlockConsumer):
         A player's Fast DDS, whose heartbeats come every 3 s, repeats a lost one no sooner.
         """
         waited = time.monotonic() - self._early_since if self._early else 0.0
-        if waited > SILENCE_AT_REST:
+        if waited > self.safety.silence_at_rest:
             self.follow(*self._early[0])  # raises
         return super().step()
 

@@ -16,9 +16,6 @@ from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
 
-DOUBT = 0.3
-"""Silence of a node, s, during which nothing begins and nothing is sent."""
-
 
 class BlockSource(ScanNode):
     """The source of a scan; a subclass describes it and computes any block of it."""
@@ -109,7 +106,7 @@ class BlockSource(ScanNode):
     def _hindrance(self, now: float) -> str:
         if waiting := self.peers.lacking(READY):
             return f"waits for {', '.join(waiting)}"
-        if silent := self.peers.silence(self.peers.names, now, DOUBT):
+        if silent := self.peers.silence(self.peers.names, now, self.safety.doubt):
             return f"waits, for {silent}"
         if crowded := self.crowded():
             return crowded
@@ -122,7 +119,7 @@ class BlockSource(ScanNode):
         count = min(self._block_size, self.total - self.next_sample)
         end = self.next_sample + count
         now = time.monotonic()
-        if self.peers.silence(self.peers.names, now, DOUBT):
+        if self.peers.silence(self.peers.names, now, self.safety.doubt):
             return False  # a reader that is stopped would block us, and we would seem silent
         ahead = end - self.peers.slowest() > self.scan.window
         if ahead or now < self._due_at() or not self._blocks.flush(now):

@@ -21,19 +21,12 @@ from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.peers import FAILED
-from afm_scan_ros.nodes.scan_node import LINGER, ScanNode
+from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.topics import NODE_STATE
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NICENESS = -11
 """Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
-DISCOVERY = 7.0
-"""Longest waits, s, for readers of the state of a node that cannot be made, and until they have it.
-
-Fast DDS tells of a node, where the first word was lost, once more after 3 s and after 6 s.
-"""
-IDLE = 0.01
-"""Longest wait for a message, and longest work on messages, s, before a node does its own work."""
 
 
 def node_class(name: str) -> type[ScanNode]:
@@ -67,7 +60,7 @@ def _made(kind: type[ScanNode]) -> ScanNode:
     try:
         node = kind()
     except InputError as error:
-        _report_refusal(kind.NAME, error)
+        _report_refusal(kind, error)
         raise
     for name in undeclared(node):
         node.get_logger().warning(f"parameter {name} does nothing: {node.NAME} has none")
@@ -88,18 +81,18 @@ def _take_priority(node: ScanNode) -> None:
         node.get_logger().info(f"no priority over other work: {error}")
 
 
-def _report_refusal(name: str, error: InputError) -> None:
+def _report_refusal(kind: type[ScanNode], error: InputError) -> None:
     """Log why a node cannot be made, and publish its state, so that no other waits for it."""
-    node = Node(name)
+    node, safety = Node(kind.NAME), kind.safety
     publisher = node.create_publisher(NODE_STATE.kind, NODE_STATE.name, NODE_STATE.writer)
     node.get_logger().error(f"{FAILED}: {error}")
-    deadline = time.monotonic() + DISCOVERY
+    deadline = time.monotonic() + safety.discovery
     while not publisher.get_subscription_count() and time.monotonic() < deadline:
-        time.sleep(IDLE)
+        time.sleep(safety.idle)
     publisher.publish(state_message(None, node.get_name(), FAILED, 0, str(error)))
     Diagnostics(node).publish(FAILED, str(error), dict)
-    publisher.wait_for_all_acked(Duration(seconds=DISCOVERY))
-    time.sleep(LINGER)
+    publisher.wait_for_all_acked(Duration(seconds=safety.discovery))
+    time.sleep(safety.last_word)
     node.destroy_node()
 
 
@@ -137,7 +130,7 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
     node.hear_others()
     while not node.finished:
         try:
-            hear(node, executor, 0.0 if busy else IDLE)
+            hear(node, executor, 0.0 if busy else node.safety.idle)
             busy = node.tick()
             if caught:
                 node.interrupt(caught.pop())
@@ -146,11 +139,11 @@ def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) ->
 
 
 def hear(node: ScanNode, executor: SingleThreadedExecutor, wait: float) -> None:
-    """Call back for all that has arrived, for IDLE at most; wait (s) where nothing has.
+    """Call back for all that has arrived, for ``safety.idle`` at most; wait (s) where nothing has.
 
     The executor serves what is no message: parameters, services and the states of a lifecycle.
     """
-    if not node.take_messages(IDLE):
+    if not node.take_messages(node.safety.idle):
         node.all_heard()
         node.await_message(wait)
     if node.watch_is_due:

@@ -16,6 +16,7 @@ from rclpy.utilities import timeout_sec_to_nsec
 from afm_scan_ros.bag.scan_info import ScanInfo, decode_block, encode_block
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.ending import end_within
@@ -24,22 +25,8 @@ from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
 from afm_scan_ros.nodes.topics import BLOCKS, NODE_STATE, NodeTopic
 
-HEARTBEAT = 0.05
-"""Seconds between two states of a node."""
-WATCH = 0.02
-"""Seconds between two looks at the other nodes, and at requests of services."""
-SILENCE_AT_REST = 5.0
-"""Silence (s) of the source after which a node no longer waits for its scan: nothing moves yet."""
-INATTENTION = 0.2
-"""Seconds of work without listening after which a node cannot tell who has been silent."""
-LINGER = 0.3
-"""Seconds a node stays after its last word, so that the others hear it."""
-ENDING = 5
-"""Seconds in which a node leaves ROS, or its process ends without; usually 0.1."""
-NAMING = 0.2
-"""Longest time, s, in which the name of a publisher's node follows on the publisher."""
 _UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""What rmw calls a node until then."""
+"""What rmw calls a node until its name is known."""
 
 COMMON = (
     NodeParameter(
@@ -72,6 +59,7 @@ class ScanNode(Node, ABC):
 
     NAME: str
     PARAMETERS: tuple[NodeParameter, ...] = ()
+    safety = SafetySettings()
 
     def __init__(self) -> None:
         super().__init__(self.NAME)
@@ -218,11 +206,11 @@ class ScanNode(Node, ABC):
     def tick(self) -> bool:
         """Watch, work, and report; return whether more work could follow at once."""
         now = time.monotonic()
-        if now - self._ticked > INATTENTION:
+        if now - self._ticked > self.safety.inattention:
             self.peers.listen_anew(now)
         self._ticked = now
         if now >= self._next_watch and not self.leaving:
-            self._next_watch = now + WATCH
+            self._next_watch = now + self.safety.watch
             self.watch(now)
         return not self.leaving and self.step()
 
@@ -231,7 +219,7 @@ class ScanNode(Node, ABC):
 
         And where samples stand still while the scan runs.
         """
-        patience = self.patience() if self.state == RUNNING else SILENCE_AT_REST
+        patience = self.patience() if self.state == RUNNING else self.safety.silence_at_rest
         trouble = self.peers.failure() or self.silence(self.watched(), now, patience)
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
@@ -257,7 +245,9 @@ class ScanNode(Node, ABC):
         """Return how long (s) a node that works may seem to stand: a block, and two heartbeats."""
         if not self.settings["real_time"]:
             return 0.5 * self.longest_standstill()
-        return float(self.settings["time_scale"]) * self._longest_block + 2.0 * HEARTBEAT
+        return (
+            float(self.settings["time_scale"]) * self._longest_block + 2.0 * self.safety.heartbeat
+        )
 
     def _own_report(self) -> Report:
         name, now = self.get_name(), time.monotonic()
@@ -330,7 +320,7 @@ class ScanNode(Node, ABC):
 
     def leave(self) -> None:
         """End the work; only the last state is still published."""
-        self._leave_at = time.monotonic() + LINGER
+        self._leave_at = time.monotonic() + self.safety.last_word
 
     def interrupt(self, signal: str) -> None:
         """End because of a signal; an unfinished scan has then failed."""
@@ -358,7 +348,7 @@ class ScanNode(Node, ABC):
             self._heartbeat.join()
         self._readers.clear()
         if self.owns_process:  # hardware and bag are closed by now
-            end_within(ENDING, self.status)
+            end_within(self.safety.leaving, self.status)
         super().destroy_node()
 
     def _log_news(self) -> None:
@@ -375,7 +365,7 @@ class ScanNode(Node, ABC):
             self.get_logger().info(f"{said} (sample {self.next_sample})")
 
     def _beat(self) -> None:
-        while not self._ended.wait(HEARTBEAT):
+        while not self._ended.wait(self.safety.heartbeat):
             self.report()
 
     def _hear(self, message: Message, _: int) -> None:
@@ -411,7 +401,7 @@ class ScanNode(Node, ABC):
             if self.count_publishers(topic) > len(pinned):
                 self._crowded_since = self._crowded_since or now
                 others = sorted({*self._gids(topic).values()} - {*pinned.values(), _UNNAMED})
-                if others or now - self._crowded_since > NAMING:
+                if others or now - self._crowded_since > self.safety.naming:
                     named = f" ({', '.join(others)})" if others else ""
                     raise ScanError(f"{topic} has another publisher{named}: stop all but one")
 

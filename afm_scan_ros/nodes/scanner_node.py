@@ -18,12 +18,7 @@ from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE
-from afm_scan_ros.nodes.run import IDLE
-from afm_scan_ros.nodes.scan_node import HEARTBEAT
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
-
-AHEAD = 0.05
-"""Longest drive (s) given to the driver at once: it is output even if this process is gone."""
 
 TIMEOUTS = (
     NodeParameter(
@@ -78,7 +73,7 @@ class ScannerNode(ManagedConsumer):
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
         # The nodes know of whom the drive is missing, and speak first.
-        starved = upstream * max(1.0, given["time_scale"]) + HEARTBEAT
+        starved = upstream * max(1.0, given["time_scale"]) + self.safety.heartbeat
         real, simulated = (
             DriverTimeouts(upstream, starved, opening, upstream, real_time=True),
             DriverTimeouts(liveness, opening, opening, opening, real_time=False),
@@ -106,7 +101,7 @@ class ScannerNode(ManagedConsumer):
         self._driver.start(info.sample_period)
         while self._driver.waiting:
             yield "waits for the driver to start"
-            self._driver.answer(IDLE)
+            self._driver.answer(self.safety.idle)
         self.get_logger().info(f"driver: {self._driver.priority}")
         if 2 * (late := self._driver.latency_samples) > info.window:
             raise InputError(
@@ -163,7 +158,7 @@ class ScannerNode(ManagedConsumer):
             return
         self._moving = [self._queue.popleft()]
         count, period = self._moving[0][0].x.size, self.scan.sample_period
-        most = min(MAX_BLOCK, AHEAD / period)
+        most = min(MAX_BLOCK, self.safety.ahead / period)
         while self._queue and (count := count + self._queue[0][0].x.size) <= most:
             self._moving.append(self._queue.popleft())
         x, y = (np.concatenate([b.axis(axis) for b, _ in self._moving]) for axis in AXES)
@@ -175,7 +170,7 @@ class ScannerNode(ManagedConsumer):
         """Publish the displacement in blocks as of the drive, while the scanner moves on."""
         if not self._moving:
             return
-        wait, self._more_may_come = 0.0 if self._more_may_come else IDLE, False
+        wait, self._more_may_come = 0.0 if self._more_may_come else self.safety.idle, False
         answer = self._driver.answer(wait)
         if answer is None:
             return

@@ -19,7 +19,8 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice, client
 from afm_scan_ros.drivers.calls import take_priority
 from afm_scan_ros.drivers.client import DriverProcess
-from afm_scan_ros.drivers.link import ENDING, DriverTimeouts, Link, Message, ramp_bound
+from afm_scan_ros.drivers.link import DriverTimeouts, Link, Message, ramp_bound
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -30,6 +31,7 @@ METRES = settings()
 PERIOD = 1e-4
 PATIENCE = 60.0
 SILENCE = 0.5
+REST = SafetySettings().rest
 SLOW = 2.0  # s, of faulty.py's driver for a block
 LATE = 1.0  # s, that the machine may take to let a process run, and to end it
 HUNG = r"the driver has not answered for"
@@ -57,13 +59,14 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
         starved: float = PATIENCE,
         answer: float = PATIENCE,
         opening: float = PATIENCE,
+        rest: float = REST,
         *,
         real_time: bool = False,
         **given: object,
     ) -> DriverProcess:
         options = {"plant_file": str(PLANT), "seed": 1, "output_log": str(tmp_path / "outputs.txt")}
         choice = DriverChoice(driver, METRES, options | given, "stage.yaml")
-        waits = DriverTimeouts(silence, starved, opening, answer, real_time)
+        waits = DriverTimeouts(silence, starved, opening, answer, real_time, rest)
         drivers.append(DriverProcess(choice, waits).opened())
         drivers[-1].start(PERIOD)
         assert drivers[-1].answer(PATIENCE) is None
@@ -215,7 +218,7 @@ def test_a_driver_that_hangs_is_named_and_ended(opened: Open, *, locked: bool) -
     begun = time.monotonic()
     assert driver.ramp_down(said) == f"{said}; {KILLED}; the drive may not be at rest"
     driver.close()
-    assert time.monotonic() - begun < ENDING + LATE
+    assert time.monotonic() - begun < REST + LATE
 
 
 @pytest.mark.parametrize("locked", [False, True])
@@ -252,12 +255,8 @@ def test_a_hang_before_the_first_block_leaves_no_process(opened: Open) -> None:
         opened("faulty:Hanging", opening=SLOW, call="start", locked=True)
 
 
-def test_a_ramp_that_hangs_is_named_and_ended(
-    opened: Open, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for module in ("link", "client"):
-        monkeypatch.setattr(f"afm_scan_ros.drivers.{module}.ENDING", SILENCE)
-    driver = opened("faulty:Hanging", call="ramp_down", locked=True)
+def test_a_ramp_that_hangs_is_named_and_ended(opened: Open) -> None:
+    driver = opened("faulty:Hanging", rest=SILENCE, call="ramp_down", locked=True)
     driver.advance(drive(0, 10), last=False)
     assert driver.answer(PATIENCE) is not None
     said = "interrupted; the driver has not said that the drive is at rest"
@@ -386,7 +385,7 @@ def test_the_ramp_does_not_depend_on_the_log(
 @given(st.floats(0.0, 100.0))
 def test_a_ramp_may_begin_after_the_buffer(late: float) -> None:
     """The buffer and as many readings may be due before it."""
-    assert ramp_bound(METRES, late) >= 2.0 * late + METRES.amplifier.longest_ramp
+    assert ramp_bound(METRES, late, REST) >= 2.0 * late + METRES.amplifier.longest_ramp
 
 
 def test_readings_in_single_precision_arrive_as_they_are(opened: Open) -> None:

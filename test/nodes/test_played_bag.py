@@ -15,7 +15,6 @@ from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.peers import RUNNING, Report
-from afm_scan_ros.nodes.scan_node import SILENCE_AT_REST
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NODE_STATE, SCAN_INFO
 from afm_scan_ros.nodes.topics import TRACKING_ERROR as ERRORS
 from afm_scan_ros.nodes.tracking_monitor import TrackingMonitor
@@ -92,7 +91,7 @@ def test_blocks_wait_for_the_announcement_of_their_scan(player: Node, *, announc
         topics[SCAN_INFO].publish(info_message(info))
         until(lambda: monitor.next_sample == BLOCK, monitor)
     else:
-        time.sleep(SILENCE_AT_REST)
+        time.sleep(monitor.safety.silence_at_rest)
         with pytest.raises(ScanError, match="a block came before scan_info"):
             monitor.step()
     monitor.destroy_node()

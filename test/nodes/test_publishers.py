@@ -20,7 +20,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes import block_source
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.peers import FAILED, READY, RUNNING, Report
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
@@ -214,7 +214,7 @@ def test_a_scan_begins_once_each_has_spoken_after_the_last_was_ready(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One that was ready may have been killed since, and be on its way back."""
-    monkeypatch.setattr(block_source, "DOUBT", PATIENCE)
+    monkeypatch.setattr(ScanNode, "safety", SafetySettings(doubt=PATIENCE))
     generator = TrajectoryGenerator()
 
     def say(name: str) -> str:

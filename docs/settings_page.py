@@ -1,0 +1,33 @@
+"""The page of settings: each number that decides, with its unit, meaning and source."""
+
+from collections.abc import Iterator
+
+from attrs import fields
+
+from afm_scan_ros.drivers.safety import SafetySettings
+
+SETTINGS: tuple[type, ...] = (SafetySettings,)
+
+INTRODUCTION = """\
+# Settings
+
+A number that decides is a field of a settings class, an instance of which is an argument of what it
+decides on. Numbers that a lab sets for itself are [parameters of the nodes](nodes.md).
+"""
+HEAD = "| field | default | unit | meaning | source |\n| --- | --- | --- | --- | --- |"
+
+
+def settings_page() -> str:
+    """Return the page in Markdown, a table for each class."""
+    return "\n".join([INTRODUCTION, *(line for each in SETTINGS for line in _section(each))])
+
+
+def _section(settings: type) -> Iterator[str]:
+    summary = str(settings.__doc__).partition("\n")[0]
+    yield f"## {settings.__name__}\n\n{summary} (`{settings.__module__}`)\n"
+    yield HEAD
+    for each in fields(settings):
+        facts = each.metadata
+        cells = f"{each.default:g}", facts["unit"], facts["meaning"], facts["source"]
+        yield f"| `{each.name}` | {' | '.join(cells)} |"
+    yield ""
