@@ -1,6 +1,7 @@
 """Who may import whom."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -134,3 +135,15 @@ def test_one_class_has_one_name() -> None:
         if isinstance(node, ast.ClassDef)
     )
     assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_the_page_on_the_architecture_names_places_that_exist() -> None:
+    page = (PACKAGE.parent / "docs" / "architecture.md").read_text("utf-8")
+    named = set(re.findall(r"\b(?<!_)[a-z][a-z_/]+(?:\.py|/)(?=[`,)\s])", page)) - {"features/"}
+    missing = [
+        name
+        for name in named
+        if not any((folder / name).exists() for folder in (PACKAGE, PACKAGE.parent))
+        and not list(PACKAGE.rglob(name))
+    ]
+    assert missing == []
