@@ -4,6 +4,8 @@
 VENV := .venv
 ROS := .venv-ros
 FLOOR_VERSIONS := .ci/ubuntu_24.04.txt
+# The checks run with these versions; a user gets the newest that are allowed.
+LOCKED := $(if $(CI),--constraint .ci/lock.txt)
 # In the order that conftest.py gives: files of few tests are often long, and none of these comes
 # last so. Tests that wait for other processes leave room for a third worker on two cores.
 # A test that hangs fails after 15 minutes, with the stack of each thread.
@@ -92,14 +94,14 @@ $(VENV)/installed: $(INPUTS)
 	$$found -m venv $(VENV) || { echo "Python's venv module is incomplete;" \
 	  "on Debian and Ubuntu: sudo apt install python3-venv" >&2; rm -rf $(VENV); exit 1; }
 	@echo "Installing afm_scan_ros and what it needs into $(VENV) (once, half a minute)"
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check $(LOCKED) --editable .
 	@$(VENV)/bin/python -m compileall -q -j 0 afm_scan_ros
 	@touch $@
 
 # And what tests, benchmarks and documents need.
 $(VENV)/ready: $(VENV)/installed
 	@echo "Installing what the tests and the documents need into $(VENV) (once, a minute and a half)"
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[docs,test]" --editable benchmarks
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check $(LOCKED) --editable ".[docs,test]" --editable benchmarks
 	@$(VENV)/bin/python -m compileall -q -j 0 benchmarks/afm_scan_bench
 	@touch $@
 

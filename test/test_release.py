@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 from catkin_pkg.package import Package, parse_package
+from packaging.requirements import Requirement
 
 from afm_scan_ros.files import version
 
@@ -73,10 +74,18 @@ def test_each_oldest_version_is_tried_and_stated() -> None:
         )
     )
     page = (ROOT / "docs/dependencies.md").read_text("utf-8")
-    asked = dict(each.split(">=") for each in PYTHON if ">=" in each)
+    asked = dict(each.partition(",")[0].split(">=") for each in PYTHON if ">=" in each)
     assert tried.keys() <= asked.keys()
     assert {name: asked[name] for name in tried} == tried
     assert all(oldest in page for oldest in tried.values())
+
+
+def test_the_checks_lock_what_is_asked_for() -> None:
+    """A version within the bounds of each dependency; extras that nothing tests are not there."""
+    text = (ROOT / ".ci/lock.txt").read_text("utf-8").lower()
+    locked = dict(re.findall(r"^(\S+)==(\S+)$", text, re.MULTILINE))
+    for each in map(Requirement, PYTHON):
+        assert each.specifier.contains(locked[each.name.lower()]), each
 
 
 def test_the_scripts_are_sound() -> None:
