@@ -11,7 +11,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 workspace=${1:-$HOME/afm_scan_ws}
 ros=${ROS_SETUP:-/opt/ros/jazzy/setup.bash}
-from_pip=("mcap>=1.5" "numba>=0.59.0" "rosbags>=0.10")
+from_pip=("mcap>=1.5,<2" "numba>=0.59.0,<1" "rosbags>=0.10,<0.12")
 pip_keys=(mcap-ros2-support python3-rosbags-pip)
 
 if [ ! -f "$ros" ]; then

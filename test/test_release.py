@@ -11,6 +11,7 @@ import pytest
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 from catkin_pkg.package import Package, parse_package
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from afm_scan_ros.files import version
 
@@ -81,11 +82,12 @@ def test_each_oldest_version_is_tried_and_stated() -> None:
 
 
 def test_the_checks_lock_what_is_asked_for() -> None:
-    """A version within the bounds of each dependency; extras that nothing tests are not there."""
-    text = (ROOT / ".ci/lock.txt").read_text("utf-8").lower()
-    locked = dict(re.findall(r"^(\S+)==(\S+)$", text, re.MULTILINE))
+    """A version within the bounds of each dependency."""
+    text = (ROOT / ".ci/lock.txt").read_text("utf-8")
+    found = re.findall(r"^(\S+)==(\S+)$", text, re.MULTILINE)
+    locked = {canonicalize_name(name): number for name, number in found}
     for each in map(Requirement, PYTHON):
-        assert each.specifier.contains(locked[each.name.lower()]), each
+        assert each.specifier.contains(locked[canonicalize_name(each.name)]), each
 
 
 def test_the_scripts_are_sound() -> None:
