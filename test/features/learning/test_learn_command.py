@@ -113,7 +113,7 @@ def test_nodes_replay_what_was_learned(tmp_path: Path) -> None:
 def test_a_driver_that_fails_while_learning_leaves_the_outputs_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drivers = Path(__file__).parents[1] / "drivers"
+    drivers = Path(__file__).parents[2] / "drivers"
     monkeypatch.setenv("PYTHONPATH", str(drivers), prepend=os.pathsep)
     log = tmp_path / "outputs.txt"
     settings = stage(tmp_path / "stage.yaml", output_log=str(log))
