@@ -96,10 +96,12 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
 def _timeouts(chain: ScanChain) -> DriverTimeouts:
     """Return how long the driver's process waits; at a slower pace drive comes less often."""
     times, opening = chain.safety, chain.safety.opening
+    own = {"rest": times.rest, "sign_of_life": times.sign_of_life}
     if not chain.time_scale:
-        return DriverTimeouts(times.simulated, opening, opening, opening, real_time=False)
+        silence = times.simulated
+        return DriverTimeouts(silence, opening, opening, opening, real_time=False, **own)
     starved = times.held * max(1.0, chain.time_scale)
-    return DriverTimeouts(times.held, starved, opening, times.held, real_time=True)
+    return DriverTimeouts(times.held, starved, opening, times.held, real_time=True, **own)
 
 
 def _prepare(chain: ScanChain, driver: DriverProcess, listener: ScanListener) -> None:

@@ -166,7 +166,7 @@ class DriverHost:
 
     def _report(self, why: str, ramp: float | str, *, bad_input: bool = False) -> None:
         """Report why the work has ended, and how long the ramp took (s) or why it failed."""
-        self._link.patience = SafetySettings().rest
+        self._link.patience = SafetySettings().rest  # the waits may not have come yet
         said = printable(ramp) if isinstance(ramp, str) else ramp
         with suppress(OSError):  # nobody may be left to hear it
             fields = {"why": printable(why), "bad_input": bad_input, "ramp": said}

@@ -43,7 +43,7 @@ class SafetySettings:
         0.2,
         "s",
         "Longest time in which the name of a node follows on its publisher",
-        "rmw announces it on another topic; measured on Fast DDS",
+        "rmw announces names on a topic of its own",
     )
     discovery: float = setting(
         7.0,
@@ -73,7 +73,10 @@ class SafetySettings:
         "0.5 s to rest, less the ramp and the process's turn (`DriverTimeouts`)",
     )
     simulated: float = setting(
-        3.0, "s", "The same of a simulated scanner", "a process that hangs: nothing moves"
+        3.0,
+        "s",
+        "Silence until the process of a simulated scanner ends, without ROS",
+        "it tells a process that hangs; nothing moves",
     )
     opening: float = setting(
         60.0,

@@ -74,9 +74,10 @@ class ScannerNode(ManagedConsumer):
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
         # The nodes know of whom the drive is missing, and speak first.
         starved = upstream * max(1.0, given["time_scale"]) + self.safety.heartbeat
+        own = {"rest": self.safety.rest, "sign_of_life": self.safety.sign_of_life}
         real, simulated = (
-            DriverTimeouts(upstream, starved, opening, upstream, real_time=True),
-            DriverTimeouts(liveness, opening, opening, opening, real_time=False),
+            DriverTimeouts(upstream, starved, opening, upstream, real_time=True, **own),
+            DriverTimeouts(liveness, opening, opening, opening, real_time=False, **own),
         )
         waits = real if given["real_time"] else simulated
         self._driver = DriverProcess(self._choice, waits).opened()
