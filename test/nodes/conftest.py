@@ -1,9 +1,10 @@
 """A domain of the tests' own, on this machine alone; a small scan; all needs ROS."""
 
 import socket
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from importlib.util import find_spec
+from itertools import cycle
 from pathlib import Path
 from typing import NoReturn
 
@@ -27,9 +28,35 @@ DOMAINS = range(215, 232)
 """Of ROS, beyond those that a command takes for itself; no system hands their ports out."""
 CLAIM = 249
 """Port of a domain that no participant takes, for none is its hundredth."""
+KEPT = 6
+"""Domains that a process of tests keeps claimed: two of them leave a third of all to others."""
 PATIENT = {"liveness_timeout_s": 5.0, "progress_timeout_s": 5.0}
 DRIVING = {"upstream_timeout_s": 5.0}
 """Parameters of nodes, and of those that drive a scanner."""
+
+
+def claimed() -> Iterator[int]:
+    """Yield domains in turn that no other process of tests has claimed, by a port of each."""
+    kept: deque[socket.socket] = deque()
+    refused = 0
+    for domain in cycle(DOMAINS):
+        if refused == len(DOMAINS):
+            pytest.fail("all domains of the tests are in use")
+        while len(kept) >= KEPT:
+            kept.popleft().close()
+        claim = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            claim.bind(("127.0.0.1", 7400 + 250 * domain + CLAIM))
+        except OSError:
+            claim.close()
+            refused += 1
+            continue
+        kept.append(claim)
+        refused = 0
+        yield domain
+
+
+CLAIMED = claimed()
 
 
 class WithoutRos(pytest.Module):
@@ -48,22 +75,14 @@ if find_spec("rclpy") is None:
         return made
 
 
-@pytest.fixture(scope="session")
-def own_domain() -> Iterator[int]:
-    """Claim a domain, by a port that no test takes which has another."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as claimed:
-        for domain in DOMAINS:
-            with suppress(OSError):
-                claimed.bind(("127.0.0.1", 7400 + 250 * domain + CLAIM))
-                yield domain
-                return
-    pytest.fail("all domains of the tests are in use")
-
-
 @pytest.fixture(autouse=True)
-def domain(own_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Share a domain with the nodes that a test starts, and with nobody else."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(own_domain))
+def domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Share a domain with the nodes that the test starts, and with nobody else.
+
+    One that was killed is counted in its domain until its lease ends, 20 s at most. So each test
+    takes the next domain, and the last few are kept from the tests beside this one.
+    """
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(next(CLAIMED)))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
