@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 __path__ = __import__("pkgutil").extend_path(__path__, __name__)
 
 if TYPE_CHECKING:
-    from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
-    from afm_scan_ros.api.identification import identify
-    from afm_scan_ros.api.model import Model, load_model, trajectory
-    from afm_scan_ros.api.record import Record, read_record
+    from afm_scan_ros.bag.record import read_record
     from afm_scan_ros.core.errors import InputError, ScanError
     from afm_scan_ros.core.limits import DriveLimits
+    from afm_scan_ros.core.record import Record
     from afm_scan_ros.core.scan_spec import ScanSpec
+    from afm_scan_ros.core.trajectory import trajectory
+    from afm_scan_ros.diagnosis import Diagnosis, diagnose
     from afm_scan_ros.features.images.files.formats import read_image
     from afm_scan_ros.features.images.identify import (
         ImageIdentification,
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     )
     from afm_scan_ros.features.images.scan_image import ScanImage
     from afm_scan_ros.features.learning.measured import Learned, learn
+    from afm_scan_ros.identification import identify
+    from afm_scan_ros.model import Model, load_model
 
     __version__: str
 
@@ -50,25 +52,25 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Diagnosis": "api.diagnosis",
+    "Diagnosis": "diagnosis",
     "DriveLimits": "core.limits",
     "ImageIdentification": "features.images.identify",
     "InputError": "core.errors",
     "Learned": "features.learning.measured",
-    "Model": "api.model",
-    "Record": "api.record",
+    "Model": "model",
+    "Record": "core.record",
     "ScanError": "core.errors",
     "ScanImage": "features.images.scan_image",
     "ScanSpec": "core.scan_spec",
     "correct_image": "features.images.identify",
-    "diagnose": "api.diagnosis",
-    "identify": "api.identification",
+    "diagnose": "diagnosis",
+    "identify": "identification",
     "identify_from_images": "features.images.identify",
     "learn": "features.learning.measured",
-    "load_model": "api.model",
+    "load_model": "model",
     "read_image": "features.images.files.formats",
-    "read_record": "api.record",
-    "trajectory": "api.model",
+    "read_record": "bag.record",
+    "trajectory": "core.trajectory",
 }
 """Where each name is from: a module is imported when the first of its names is used."""
 

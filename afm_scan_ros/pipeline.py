@@ -20,9 +20,9 @@ import numpy as np
 from attrs import define, field, frozen
 
 from afm_scan_ros.bag.live import TRUE, LiveRecorder, LiveWriter, ScanListener
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from afm_scan_ros import pipeline
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.online.adapted_scan import AdaptedScan
 from afm_scan_ros.core.online.line_feedback import FedBack, LineFeedback, lines_of_delay
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.scan_inversion import InversionSettings, ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples

@@ -10,12 +10,12 @@ from afm_scan_ros.bag.scan_info import (
     LINE_FIGURES,
     MONITOR,
     SAMPLE,
-    ScanInfo,
     encode_line,
     encode_sample,
 )
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import (
     ACHIEVED,
     DRIVE,

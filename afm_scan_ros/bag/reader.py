@@ -16,13 +16,13 @@ from afm_scan_ros.bag.scan_info import (
     VOLTAGE,
     BlockDecoder,
     Continuity,
-    ScanInfo,
     decode_block,
     decode_info,
     info_of_block,
 )
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import Aligner, end, part
 from afm_scan_ros.core.types import AXES, Trace
 

@@ -16,10 +16,11 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from afm_scan_ros.bag.folder import NAME, BagTopic, Contents, metadata_text, offered_qos
-from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
+from afm_scan_ros.bag.scan_info import STREAMS, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.typestore import typestore
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from attrs import evolve
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.cli.orders import (
     COMPENSATOR,
     MONITOR,
@@ -22,6 +21,7 @@ from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings

@@ -7,9 +7,7 @@ from pathlib import Path
 import click
 from attrs import evolve
 
-from afm_scan_ros.api import identification as api
-from afm_scan_ros.api.model import Model
-from afm_scan_ros.api.record import Record
+from afm_scan_ros import identification as api
 from afm_scan_ros.cli.options import (
     NEW_FILE,
     RECORD,
@@ -25,8 +23,10 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
 from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.model import Model
 from afm_scan_ros.report.effect_status_text import left_out, status_text
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text

@@ -7,8 +7,6 @@ from pathlib import Path
 import click
 import numpy as np
 
-from afm_scan_ros.api.model import load_model
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import (
     BAG,
@@ -24,11 +22,13 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.records.recording import kind_of, problems
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.columns import USE_OF_PATH, TableRecord, read_table_record
 from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.text_table import RowRange
+from afm_scan_ros.model import load_model
 from afm_scan_ros.report.terminal import say
 
 STREAM = {

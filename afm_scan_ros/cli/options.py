@@ -16,9 +16,10 @@ from attrs import evolve, frozen
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from afm_scan_ros.api.record import Record, is_table, read_record
 from afm_scan_ros.bag.reader import TYPES
+from afm_scan_ros.bag.record import is_table, read_record
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns

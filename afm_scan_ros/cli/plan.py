@@ -8,7 +8,7 @@ from typing import Any
 import click
 from attrs import fields, frozen
 
-from afm_scan_ros.api.record import read_record
+from afm_scan_ros.bag.record import read_record
 from afm_scan_ros.cli.options import FOLDER, positive, quantity
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError

@@ -8,9 +8,7 @@ import click
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.api import diagnosis as api
-from afm_scan_ros.api.model import load_model
-from afm_scan_ros.api.record import Record
+from afm_scan_ros import diagnosis as api
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import (
     FILE,
@@ -31,10 +29,12 @@ from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.online import TIME_CONSTANT
 from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import model_file
 from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.model import load_model
 from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of

@@ -10,7 +10,6 @@ import click
 from attrs import evolve, field, frozen
 from click.core import ParameterSource
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
 from afm_scan_ros.core.compensation import Compensation
@@ -20,6 +19,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace

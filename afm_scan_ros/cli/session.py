@@ -4,10 +4,8 @@ from pathlib import Path
 
 from attrs import define, field
 
-from afm_scan_ros.api.diagnosis import info_of, observation_of
-from afm_scan_ros.api.record import read_record
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.record import read_record
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
@@ -18,7 +16,9 @@ from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.diagnosis import info_of, observation_of
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan

@@ -11,8 +11,10 @@ from functools import cached_property
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import ArrayLike
 from scipy.fft import next_fast_len
 
+from afm_scan_ros.core.arguments import period_of, refuse_other_count, samples
 from afm_scan_ros.core.effects.effect_type import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.registry import coupled_form
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -23,8 +25,11 @@ from afm_scan_ros.core.identification.state_space.feedback import (
     with_added,
 )
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Array
 
+SAME_PERIOD = 1e-9
+"""Relative difference of two sample periods that is rounding."""
 LEFT_OUT = 0.01
 """Share of a signal that may be left out, also of a model whose own error is less."""
 
@@ -127,6 +132,18 @@ class CoupledScanner:
         """Largest relative error of any level."""
         return max(error.relative for error in self.errors)
 
+    def checked(self, what: str, given: ArrayLike, sample_period: float) -> Array:
+        """Return a signal as (n, channels); raises InputError unless it suits the model."""
+        values = samples(what, given)
+        refuse_other_count(what, values, self.axes)
+        period = period_of(sample_period)
+        if abs(period / self.sample_period - 1.0) > SAME_PERIOD:
+            raise InputError(
+                f"sample_period is {period:.9g} s, and the model of coupled axes was identified at"
+                f" {self.sample_period:.9g} s: resample {what} to that"
+            )
+        return values
+
     def predict(self, drive: Array, *, periodic: bool) -> Array:
         """Displacement (samples, p) of a drive (samples, m), from rest or as one whole period.
 
@@ -194,6 +211,20 @@ class CoupledScanner:
                 f" {drive[sample, channel]:.6g} is beyond the {self.reach:.4g} V that the model was"
                 " identified to: move less, or identify a wider range"
             )
+
+    def refuse_beyond(self, drive: Array, limits: DriveLimits) -> None:
+        """Raise ScanError for the first sample beyond the amplifier's voltage or slew."""
+        slope = np.diff(drive, axis=0, prepend=drive[:1]) / self.sample_period
+        for quantity, values, limit in (
+            ("drive [V]", drive, limits.voltage),
+            ("slope of the drive [V/s]", slope, limits.slew),
+        ):
+            for sample, channel in np.argwhere(np.abs(values) > limit)[:1]:
+                raise ScanError(
+                    f"sample {sample}, axis {self.axes[channel]}: {quantity} ="
+                    f" {values[sample, channel]:.6g} is beyond the amplifier's {limit:g}: move less"
+                    " or more slowly"
+                )
 
     def _refuse_untracked(self, drive: Array, desired: Array, *, periodic: bool) -> None:
         """Raise InputError where the model does not follow by the drive that is returned."""

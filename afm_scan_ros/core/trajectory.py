@@ -15,8 +15,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from afm_scan_ros.core.arguments import SPEC, of_type
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import AXES, Array, Trace, channels_of
 
 
 def smooth_step(s: Array) -> Array:
@@ -334,3 +335,19 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
         return 1.0
     rise = smooth_step(1.0 + samples / approach_samples(spec))
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))
+
+
+def trajectory(spec: ScanSpec) -> Array:
+    """Return the desired displacement (m) of a whole scan, (n, 2): x and y.
+
+    It begins and ends at rest at zero, after the preparation, the approach and the settling of
+    ``spec``; its sample period is ``spec.sample_period``.
+
+    >>> import afm_scan_ros as afm
+    >>> spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, preparation="none")
+    >>> desired = afm.trajectory(spec)
+    >>> desired.shape, float(desired[:, 0].max())
+    ((12001, 2), 5e-06)
+    """
+    of_type(ScanSpec, "spec", spec, SPEC)
+    return channels_of(desired(spec, 0, total_samples(spec)), AXES)

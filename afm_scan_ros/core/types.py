@@ -1,6 +1,6 @@
 """Frozen records and array types used by the whole package."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -41,3 +41,15 @@ class Trace:
     def axis(self, name: str) -> Array:
         """Return the samples of axis ``"x"`` or ``"y"``."""
         return {"x": self.x, "y": self.y}[name]
+
+
+def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
+    """Return values (n, channels) as both axes of a run from sample 0; an absent one is zero."""
+    given = {name: values[:, channel] for channel, name in enumerate(axes)}
+    still = np.zeros(len(values))
+    return Trace(0, sample_period, *(given.get(name, still) for name in AXES))
+
+
+def channels_of(trace: Trace, axes: Sequence[str]) -> Array:
+    """Return some axes of a run as (n, channels), each channel contiguous."""
+    return np.stack([trace.axis(name) for name in axes]).T

@@ -10,8 +10,9 @@ from functools import partial
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block, info_from_message
+from afm_scan_ros.bag.scan_info import encode_block, info_from_message
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import BlockGuard, Message, Outbox

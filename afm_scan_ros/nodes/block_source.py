@@ -7,8 +7,9 @@ from math import ceil
 
 from attrs import evolve
 
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.flow import MAX_MESSAGE_RATE, USUAL_WINDOW, block_size_at
 from afm_scan_ros.nodes.messages import Outbox, info_message

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.drives.experiments import KINDS, resized
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.drive_files import read_drive
 from afm_scan_ros.nodes.block_source import BlockSource

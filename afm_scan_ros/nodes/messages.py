@@ -11,8 +11,9 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from afm_scan_ros.bag.scan_info import Block, ScanInfo, decode_block, info_fields
+from afm_scan_ros.bag.scan_info import Block, decode_block, info_fields
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import MAX_BLOCK, LineError, MonitorSample
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.msg import MonitorSample as MonitorSampleMessage

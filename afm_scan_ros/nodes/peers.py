@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.scan_info import ScanInfo
 
 READY, RUNNING, DONE, FAILED = "ready", "running", "done", "failed"
 

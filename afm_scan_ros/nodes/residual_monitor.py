@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
 from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import desired

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.image_lines import ImageLines, frame_of
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.sample_file import load_sample
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of

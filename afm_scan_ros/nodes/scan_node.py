@@ -13,8 +13,9 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.utilities import timeout_sec_to_nsec
 
-from afm_scan_ros.bag.scan_info import ScanInfo, decode_block, encode_block
+from afm_scan_ros.bag.scan_info import decode_block, encode_block
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.nodes.declare import declare

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import refuse_step
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.drivers import DriverChoice

@@ -5,7 +5,8 @@ from contextlib import suppress
 
 from rclpy._rclpy_pybind11 import RCLError
 
-from afm_scan_ros.bag.scan_info import ScanInfo, decode_block
+from afm_scan_ros.bag.scan_info import decode_block
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineErrors, MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace

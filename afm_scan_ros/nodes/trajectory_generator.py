@@ -3,8 +3,8 @@
 from attrs import evolve
 from std_srvs.srv import Trigger
 
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash

@@ -10,9 +10,9 @@ from pathlib import Path
 from attrs import field, frozen
 from matplotlib.figure import Figure
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.report.style import styled

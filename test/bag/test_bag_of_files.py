@@ -10,9 +10,9 @@ from rosbags.highlevel import AnyReader
 
 from afm_scan_ros.bag import writer as bag_writer
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Array, Trace
 
 PERIOD = 1e-2

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import DISPLACEMENT, ScanInfo, encode_block, encode_info
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter, ScanWriter
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 ROOT = Path(__file__).parents[2]

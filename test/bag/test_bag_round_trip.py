@@ -16,15 +16,14 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import (
     DISPLACEMENT,
     STREAMS,
-    ScanInfo,
     decode_block,
     decode_info,
     encode_block,
     encode_info,
-    info_of_scan,
 )
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter, ScanWriter
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 

@@ -14,10 +14,11 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from afm_scan_ros.bag.mcap_file import LARGEST
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import DISPLACEMENT, ScanInfo, encode_block, encode_info
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 PERIOD, SAMPLES, BLOCK = 1e-2, 400, 50

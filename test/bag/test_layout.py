@@ -5,14 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.bag.scan_info import (
-    DISPLACEMENT,
-    BlockDecoder,
-    ScanInfo,
-    decode_block,
-    encode_block,
-)
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, BlockDecoder, decode_block, encode_block
 from afm_scan_ros.bag.typestore import decode, layout_of
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 PERIOD = 1e-5

@@ -3,13 +3,13 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.api.diagnosis import refuse_same
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
+from afm_scan_ros.diagnosis import refuse_same
 from helpers.in_process import ALL, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=2, samples_per_line=500, preparation="none")

@@ -8,18 +8,12 @@ import pytest
 
 import afm_scan_ros as afm
 from afm_scan_ros.bag.reader import assigned
-from afm_scan_ros.bag.scan_info import (
-    DISPLACEMENT,
-    STREAMS,
-    VOLTAGE,
-    ScanInfo,
-    encode_block,
-    encode_info,
-)
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, STREAMS, VOLTAGE, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 INFO = ScanInfo("someone's", 10**18, "ignored", 1e-3, 100)

@@ -10,11 +10,12 @@ from attrs import evolve
 
 import afm_scan_ros as afm
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block, encode_info
+from afm_scan_ros.bag.scan_info import STREAMS, encode_block, encode_info
 from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.diagnosis import search
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 PERIOD, BLOCK = 1e-3, 50

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from afm_scan_ros.api.record import read_record
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.bag.record import read_record
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Array, Trace
 
 SAMPLES, PERIOD = 2000, 1e-3

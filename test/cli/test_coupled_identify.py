@@ -8,8 +8,8 @@ from click.testing import CliRunner
 from scipy.signal import cont2discrete, lfilter
 
 import afm_scan_ros as afm
-from afm_scan_ros.api.identification import of_coupled_axes
 from afm_scan_ros.cli.identify import identify
+from afm_scan_ros.identification import of_coupled_axes
 
 PERIOD, SAMPLES, LINES = 5e-4, 512, 150
 RESONANCES = (110.0, 160.0, 230.0)

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli import demo as demonstration
 from afm_scan_ros.cli.main import COMMANDS
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.files.plant_file import load_scan
 from helpers.in_process import scan
 

@@ -13,7 +13,6 @@ import pytest
 from attrs import evolve, frozen
 from click.testing import CliRunner, Result
 
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.main import main
@@ -25,6 +24,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory, version

@@ -7,11 +7,11 @@ import pytest
 from attrs import evolve
 from click.testing import CliRunner
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.identify import identify, read_calibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
 INFO = ScanInfo("one", 0, "creep", 1e-3, 100)

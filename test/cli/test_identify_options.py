@@ -66,8 +66,8 @@ def test_records_are_taken_to_begin_depolarised_where_that_is_stated(
 
     table = tmp_path / "scan.csv"
     table.write_text("time [s],drive_x [V],achieved_x [um]\n0,0,0\n1,1,5\n2,0,0\n", "utf-8")
-    monkeypatch.setattr("afm_scan_ros.api.identification.identify", note)
-    monkeypatch.setattr("afm_scan_ros.api.diagnosis.diagnose", note)
+    monkeypatch.setattr("afm_scan_ros.identification.identify", note)
+    monkeypatch.setattr("afm_scan_ros.diagnosis.diagnose", note)
     model = ["--model", str(MODEL)] if command is diagnose else []
     for option in ([], ["--depolarised"]):
         arguments = [str(table), *model, *option, "--out", str(tmp_path / "out")]

@@ -8,15 +8,15 @@ import pytest
 from attrs import evolve
 from click.testing import CliRunner
 
-from afm_scan_ros.api import identification as api
-from afm_scan_ros.api.model import Model, load_model
-from afm_scan_ros.api.record import Record
+from afm_scan_ros import identification as api
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.model import Status
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.model import Model, load_model
 from helpers.in_process import default_plant, record, scan
 from helpers.small_records import bag, creep, frequency
 

@@ -11,7 +11,6 @@ from attrs import define, evolve, field
 from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli import calibrate as command
 from afm_scan_ros.cli.driving import DrivenScanner
@@ -19,6 +18,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
 from helpers.in_process import default_plant, drive_through

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.cli import session
 from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import FAST_SPEC, default_model

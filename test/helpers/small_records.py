@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
 from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.scan_info import ScanInfo
 
 
 def creep() -> Plan[Waypoints]:

@@ -9,9 +9,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader
 from afm_scan_ros.nodes.diagnostics import PERIOD

@@ -7,7 +7,7 @@ from typing import Self
 
 import pytest
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.run import live

@@ -10,9 +10,10 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTran
 from rclpy.node import Node
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.peers import FAILED

@@ -8,9 +8,10 @@ import pytest
 from attrs import evolve
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block, info_of_scan
+from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import Message, info_message, state_message

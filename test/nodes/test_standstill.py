@@ -6,7 +6,7 @@ from attrs import define, field, frozen
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING, Peers, Report
 
 READS = {  # in the order of the data flow

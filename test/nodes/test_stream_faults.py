@@ -10,7 +10,8 @@ from attrs import evolve
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.run import live

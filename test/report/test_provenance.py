@@ -2,7 +2,7 @@
 
 import pytest
 
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.report.html import source_of
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace

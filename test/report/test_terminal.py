@@ -9,9 +9,9 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli.main import main
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.report.table import Rows, Table

@@ -7,8 +7,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type, positive
-from afm_scan_ros.api.model import Model
+from afm_scan_ros.core.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type, positive
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array, ProgressCallback
@@ -23,6 +22,7 @@ from afm_scan_ros.features.images.grating.registered_image import (
 from afm_scan_ros.features.images.predicted import predicted_positions
 from afm_scan_ros.features.images.regrid import common_rectangle, regridded
 from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.model import Model
 
 ACCURACY = 0.0035
 """Accuracy of a pitch over an image, which published corrections of gratings reach."""

@@ -8,8 +8,7 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import LIMITS, MODEL, SPEC, of_type, samples, whole
-from afm_scan_ros.api.model import UNLIMITED, Model
+from afm_scan_ros.core.arguments import LIMITS, MODEL, SPEC, of_type, samples, whole
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
@@ -23,6 +22,7 @@ from afm_scan_ros.features.learning.loop import SCANS, LearningScan, best_of
 from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.paths import path_of
+from afm_scan_ros.model import UNLIMITED, Model
 
 LOG = logging.getLogger(__name__)
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.api.diagnosis import Diagnosis, diagnose
-from afm_scan_ros.api.model import Model, load_model
-from afm_scan_ros.api.record import Record, read_record
+from afm_scan_ros.bag.record import read_record
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, Value
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.diagnosis import Diagnosis, diagnose
 from afm_scan_ros.features.survey.recording import (
     EffectValue,
     NamedEffect,
@@ -20,6 +20,7 @@ from afm_scan_ros.features.survey.recording import (
     estimates,
 )
 from afm_scan_ros.files import version
+from afm_scan_ros.model import Model, load_model
 
 
 @frozen

@@ -13,7 +13,6 @@ from typing import Any
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.api.model import load_model
 from afm_scan_ros.bag.collection import FoundBag, found_bags, instrument_of
 from afm_scan_ros.cli.options import FOLDER, RECORD, positive, working
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -24,6 +23,7 @@ from afm_scan_ros.features.survey.page import Survey, alert, page, summary
 from afm_scan_ros.features.survey.recording import Recording
 from afm_scan_ros.features.survey.workers import Outcome, WorkerOptions, worker_options
 from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.model import load_model
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 

@@ -11,7 +11,6 @@ from attrs import frozen
 
 from afm_scan_bench.any_lab.diagnosis import HEALTHY, calibrated, drawn, with_effect
 from afm_scan_bench.diagnosis.prior import Prior, prior_of
-from afm_scan_ros.api.diagnosis import observation_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import features_of
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.cautions import with_healthy
@@ -21,6 +20,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.diagnosis import observation_of
 from afm_scan_ros.report.table import Row, Table
 
 Form = tuple[str, str]

@@ -10,9 +10,10 @@ from mcap.writer import CompressionType, Writer
 
 from afm_scan_bench.speed.timing.ratios import COLUMNS, by_turns, row, seconds
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import STREAMS, ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import STREAMS, encode_block
 from afm_scan_ros.bag.writer import BagWriter, ScanWriter
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.table import Row, Table
 

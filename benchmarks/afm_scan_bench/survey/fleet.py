@@ -10,9 +10,9 @@ from afm_scan_bench.diagnosis.unmodelled.scanner import healthy_scanner
 from afm_scan_bench.mechanisms.product_sizes import sized
 from afm_scan_bench.scans import spec_at
 from afm_scan_bench.session import InProcessSession
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.simulation.axis import AxisSpec, detuned_axis, series, with_series

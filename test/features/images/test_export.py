@@ -10,13 +10,13 @@ from attrs import evolve
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.typestore import encode
 from afm_scan_ros.bag.writer import ScanWriter, write_record
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.image_lines import frame_of
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Trace

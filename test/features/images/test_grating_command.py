@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_ros.api.model import load_model
 from afm_scan_ros.cli.main import cli, main
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.files.formats import read_image
 from afm_scan_ros.features.images.grating.features import levelled
+from afm_scan_ros.model import load_model
 
 PACKAGE = find_spec("NSFopen")
 FOLDER = Path(PACKAGE.origin or "").parent / "example/Plane_Removal" if PACKAGE else Path()

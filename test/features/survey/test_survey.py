@@ -11,11 +11,11 @@ from attrs import evolve
 from click.testing import CliRunner, Result
 from pyarrow import parquet
 
-from afm_scan_ros.api import diagnosis as api_diagnosis
-from afm_scan_ros.bag.scan_info import info_of_scan
+from afm_scan_ros import diagnosis as api_diagnosis
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis import diagnosis as core_diagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.features.survey import survey_command as command
 from afm_scan_ros.features.survey.assignment import Assignment, survey_bag

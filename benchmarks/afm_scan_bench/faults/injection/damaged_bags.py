@@ -16,10 +16,10 @@ from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.outcome import LossError, ProcessEnd, Tally, command, damaged
 from afm_scan_bench.scans import scan
-from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.main import BAD_INPUT, DOES_NOT_HOLD
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import part
 from afm_scan_ros.report.table import Row

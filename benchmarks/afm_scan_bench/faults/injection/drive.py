@@ -31,7 +31,8 @@ from afm_scan_bench.faults.injection.faulty_scanner import (
 )
 from afm_scan_bench.faults.injection.processes import INCOMPLETE
 from afm_scan_bench.faults.injection.trial import MOMENT, PATIENCE, Trial
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE

@@ -15,8 +15,9 @@ from afm_scan_bench.faults.faults import Announce, row
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import INCOMPLETE, NODES
 from afm_scan_bench.faults.injection.trial import PATIENT, SCAN, Trial, numbered, undisturbed
-from afm_scan_ros.bag.scan_info import ScanInfo, encode_block
+from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 from afm_scan_ros.report.table import Row

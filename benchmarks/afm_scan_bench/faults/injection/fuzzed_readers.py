@@ -13,9 +13,9 @@ import afm_scan_ros as afm
 from afm_scan_bench.faults.damage import Rng, cut, edited, turned
 from afm_scan_bench.faults.faults import Announce
 from afm_scan_bench.faults.injection.outcome import Tally
-from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.core.correction import Correction
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import load_settings

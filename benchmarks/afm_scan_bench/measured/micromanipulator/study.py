@@ -15,16 +15,15 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_bench.measured.recordings import measured_data
-from afm_scan_ros.api.arguments import trace_of
-from afm_scan_ros.api.identification import identify
-from afm_scan_ros.api.model import Model
-from afm_scan_ros.api.record import Record
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.optimal_inverse import SmoothWeight
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, InverseSettings
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.types import Array, trace_of
 from afm_scan_ros.files.tables import read_table
+from afm_scan_ros.identification import identify
+from afm_scan_ros.model import Model
 
 FOLDER = "piezo_micromanipulator"
 SAMPLE_RATE = 200

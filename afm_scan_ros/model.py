@@ -1,4 +1,4 @@
-"""A scanner's model, which predicts and inverts, and the desired displacement of a scan."""
+"""A scanner's model, which predicts and inverts."""
 
 import logging
 from collections.abc import Iterable, Mapping
@@ -9,17 +9,14 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.api.arguments import (
+from afm_scan_ros.core.arguments import (
     LIMITS,
-    SPEC,
     all_of_type,
-    channels_of,
     of_type,
     period_of,
     positive,
     refuse_other_count,
     samples,
-    trace_of,
 )
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -27,11 +24,8 @@ from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeig
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
-from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
-from afm_scan_ros.core.trajectory import desired as desired_of
-from afm_scan_ros.core.trajectory import total_samples
-from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.types import Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.report.effect_status_text import left_out
@@ -124,9 +118,9 @@ class Model:
         was identified in. Effects that are unknown are left out; a warning in the log names them.
         """
         if not isinstance(self._scanner, ScannerModel):
-            from afm_scan_ros.api import coupled  # noqa: PLC0415 - loads what few models need
-
-            return coupled.predicted(self._scanner, drive, sample_period, periodic=periodic)
+            return self._scanner.predict(
+                self._scanner.checked("drive", drive, sample_period), periodic=periodic
+            )
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
@@ -169,14 +163,15 @@ class Model:
         """
         of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
         if not isinstance(self._scanner, ScannerModel):
-            from afm_scan_ros.api import coupled  # noqa: PLC0415 - see predict
-
             for name, value in {"effects": effects, "weight": weight}.items():
                 if value is not None:
                     raise InputError(f"{name}: a model of coupled axes inverts all: leave it out")
-            return coupled.inverted(
-                self._scanner, desired, sample_period, limits, periodic=periodic
+            scanner = self._scanner
+            drive = scanner.invert(
+                scanner.checked("desired", desired, sample_period), periodic=periodic
             )
+            scanner.refuse_beyond(drive, limits or UNLIMITED)
+            return drive
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         target = self._trace("desired", desired, sample_period)
@@ -206,7 +201,7 @@ class Model:
         if isinstance(self._scanner, ScannerModel):
             model_file.save_model(file, self._scanner, made)
         else:
-            from afm_scan_ros.files import coupled_file  # noqa: PLC0415 - see predict
+            from afm_scan_ros.files import coupled_file  # noqa: PLC0415 - loads what few models need
 
             coupled_file.save_coupled(file, self._scanner, made)
 
@@ -241,23 +236,7 @@ def load_model(path: Path | str | None = None) -> Model:
     file = share_directory() / "config/model.yaml" if path is None else path_of(path, MODEL_FILE)
     content = yaml.load(file)
     if isinstance(content, Mapping) and "coupled" in content:
-        from afm_scan_ros.files.coupled_file import load_coupled  # noqa: PLC0415 - see predict
+        from afm_scan_ros.files.coupled_file import load_coupled  # noqa: PLC0415 - see save
 
         return Model(load_coupled(file), str(file))
     return Model(model_file.load_model(file), str(file))
-
-
-def trajectory(spec: ScanSpec) -> Array:
-    """Return the desired displacement (m) of a whole scan, (n, 2): x and y.
-
-    It begins and ends at rest at zero, after the preparation, the approach and the settling of
-    ``spec``; its sample period is ``spec.sample_period``.
-
-    >>> import afm_scan_ros as afm
-    >>> spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, preparation="none")
-    >>> desired = afm.trajectory(spec)
-    >>> desired.shape, float(desired[:, 0].max())
-    ((12001, 2), 5e-06)
-    """
-    of_type(ScanSpec, "spec", spec, SPEC)
-    return channels_of(desired_of(spec, 0, total_samples(spec)), AXES)

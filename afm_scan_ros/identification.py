@@ -2,9 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from afm_scan_ros.api.arguments import RECORDS, all_of_type, whole
-from afm_scan_ros.api.model import Model
-from afm_scan_ros.api.record import Record
+from afm_scan_ros.core.arguments import RECORDS, all_of_type, whole
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import PLANS
@@ -19,7 +17,9 @@ from afm_scan_ros.core.identification.state_space.identify import (
 )
 from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.model import Model
 
 
 def of_coupled_axes(records: Sequence[Record]) -> bool:

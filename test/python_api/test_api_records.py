@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
@@ -21,6 +20,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
 from afm_scan_ros.core.identification.drives.experiments import KINDS, SWEEPS
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, Scan, default_model, scan

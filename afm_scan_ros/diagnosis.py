@@ -9,11 +9,7 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve, field, frozen
 
-from afm_scan_ros.api.arguments import MODEL, RECORDS, all_of_type, of_type, positive
-from afm_scan_ros.api.identification import coupled_records
-from afm_scan_ros.api.model import Model
-from afm_scan_ros.api.record import Record
-from afm_scan_ros.bag.scan_info import ScanInfo
+from afm_scan_ros.core.arguments import MODEL, RECORDS, all_of_type, of_type, positive
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis, diagnose_coupled
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
@@ -23,8 +19,12 @@ from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import AXES, ProgressCallback
 from afm_scan_ros.files.paths import path_of
+from afm_scan_ros.identification import coupled_records
+from afm_scan_ros.model import Model
 from afm_scan_ros.report import diagnosis_page
 from afm_scan_ros.report.diagnosis_text import (
     caution_text,

@@ -1,4 +1,4 @@
-"""Checks what a user gives, and converts arrays to and from the core's signals of two axes."""
+"""Checks of what a user gives, with errors that say what to give instead."""
 
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.core.types import Array
 
 Kind = TypeVar("Kind")
 
@@ -98,15 +98,3 @@ def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
             f"{what} has {channels} channel{'s' * (channels > 1)}, but the axes are"
             f" {', '.join(axes)}: give shape (n, {len(axes)})"
         )
-
-
-def trace_of(values: Array, axes: Sequence[str], sample_period: float) -> Trace:
-    """Return values (n, channels) as both axes of a run from sample 0; an absent one is zero."""
-    given = {name: values[:, channel] for channel, name in enumerate(axes)}
-    still = np.zeros(len(values))
-    return Trace(0, sample_period, *(given.get(name, still) for name in AXES))
-
-
-def channels_of(trace: Trace, axes: Sequence[str]) -> Array:
-    """Return some axes of a run as (n, channels), each channel contiguous."""
-    return np.stack([trace.axis(name) for name in axes]).T
