@@ -1,13 +1,13 @@
 """Diagnosis of records: the effects that a model lacks."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from attrs import evolve, field, frozen
+from attrs import field, frozen
 
 from afm_scan_ros.core.arguments import MODEL, RECORDS, all_of_type, of_type, positive
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
@@ -15,7 +15,6 @@ from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis, diag
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose as diagnose_scanner
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect
 from afm_scan_ros.core.errors import InputError
@@ -23,7 +22,7 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import AXES, ProgressCallback
 from afm_scan_ros.files.paths import path_of
-from afm_scan_ros.identification import coupled_records
+from afm_scan_ros.identification import named
 from afm_scan_ros.model import Model
 from afm_scan_ros.report import diagnosis_page
 from afm_scan_ros.report.diagnosis_text import (
@@ -40,13 +39,14 @@ SAME = 1e-6
 """Of a record's range: text with seven digits keeps as much, and no sensor repeats itself so."""
 
 
-def refuse_same(infos: Sequence[ScanInfo], records: Sequence[Observation]) -> None:
+def refuse_same(records: Sequence[Record]) -> None:
     """Refuse two records of one scan: copies, parts, or what two recorders have of it.
 
     They are compared by the scan's id and beginning, and where these are unknown by the samples.
     Raises InputError, which names both.
     """
-    for (info, record), (other, again) in combinations(zip(infos, records, strict=True), 2):
+    for record, again in combinations(records, 2):
+        info, other = info_of(record), info_of(again)
         named = info.start != 0 and (info.scan_id, info.start) == (other.scan_id, other.start)
         if named or _alike(record, again):
             raise InputError(
@@ -55,12 +55,12 @@ def refuse_same(infos: Sequence[ScanInfo], records: Sequence[Observation]) -> No
             )
 
 
-def _alike(record: Observation, again: Observation) -> bool:
+def _alike(record: Record, again: Record) -> bool:
     """Whether both hold the same samples as far as the shorter one reaches."""
     if record.sample_period != again.sample_period:
         return False
-    both = min(len(each.displacement.x) for each in (record, again))
-    pairs = ([each.displacement.axis(a)[:both] for each in (record, again)] for a in AXES)
+    both = min(len(each.displacement) for each in (record, again))
+    pairs = ([each.signals(a)[1][:both] for each in (record, again)] for a in AXES)
     return all(np.abs(one - other).max() <= SAME * np.ptp(one) for one, other in pairs)
 
 
@@ -190,29 +190,45 @@ def diagnose(
 ) -> Diagnosis:
     """Find the effects that explain the residual of a model in records.
 
-    A model of coupled axes takes records as ``identify`` does: of one or more amplitudes, each with
-    more realisations than axes. They may exceed the amplitudes of the model. ``healthy`` is best
-    what it was identified from. Without, the model's own word stands for its amplitudes. The
-    structure is identified anew with the effects found, from ``healthy`` and ``records``, or from
-    ``records`` alone where its linear response has changed.
+    Parameters
+    ----------
+    model
+        With its model discrepancy, which ``identify`` measures on held-out records.
+    records
+        Of one scanner, each of another scan, of 1000 samples or more. The axes that the model and
+        every record hold are diagnosed. A model of coupled axes takes records as ``identify`` does:
+        of one or more amplitudes, each with more realisations than axes; they may exceed the
+        amplitudes of the model.
+    healthy
+        Further records of the scanner while nothing was wrong with it, as ordinary scans: they add
+        the model's error on motion of their kind to the model. Of coupled axes they are best what
+        the model was identified from; without, the model's stated error stands for its amplitudes.
+    progress
+        Is called with the effect that is being tried.
+    longest
+        Length of a proposed experiment, at most, s.
+    parallel
+        Diagnose the axes at the same time, in threads. In turn, they take less time of the cores,
+        and longer. Coupled axes are diagnosed together.
 
-    Arguments:
-        model: with its model discrepancy, which ``identify`` measures on held-out records.
-        records: of one scanner, each of another scan, of 1000 samples or more. The axes that the
-            model and every record hold are diagnosed.
-        healthy: further records of the scanner while nothing was wrong with it, as ordinary scans.
-            They add the model's error on motion of their kind to the model.
-        progress: is called with the effect that is being tried.
-        longest: length of a proposed experiment, at most, s.
-        parallel: diagnose the axes at the same time, in threads. In turn, they take less time of
-            the cores, and longer. Coupled axes are diagnosed together.
+    Returns
+    -------
+    Diagnosis
+        Verdict, effects with intervals and probabilities, and the model extended by them. The
+        structure of coupled axes is identified anew with the effects found, from ``healthy`` and
+        ``records``, or from ``records`` alone where its linear response has changed.
 
-    Raises InputError where an argument is of another type, there is no record, a record is of
-    another scanner or unit or is given twice, its drive leaves the range that the model was
-    identified in, no axis is in all, or the model states no model discrepancy. Of coupled axes, it
-    is raised as by ``identify``, and ScanError where the structure cannot be identified with the
-    effects found.
+    Raises
+    ------
+    InputError
+        Where an argument is of another type, there is no record, a record is of another scanner or
+        unit or is given twice, its drive leaves the range that the model was identified in, no axis
+        is in all, or the model states no model discrepancy. Of coupled axes, as by ``identify``.
+    ScanError
+        Where the structure of coupled axes cannot be identified with the effects found.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> import afm_scan_ros as afm
     >>> model = afm.load_model()
@@ -225,21 +241,20 @@ def diagnose(
     'model_sufficient'
     """
     of_type(Model, "model", model, MODEL)
-    given = tuple(_named(all_of_type(Record, "records", records, RECORDS), "record"))
+    given = tuple(named(all_of_type(Record, "records", records, RECORDS)))
     longest = positive("longest", longest, "in s, as 60.0")
-    well = tuple(_named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
+    well = tuple(named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
     if model.is_coupled:
         return _coupled(model, given, well, progress or (lambda _: None))
     scanner = model.scanner
-    observations, of_healthy = (list(map(observation_of, some)) for some in (given, well))
-    for observed in (*observations, *of_healthy):
-        refuse_mismatch(scanner, observed)
-    refuse_same([info_of(record) for record in (*given, *well)], [*observations, *of_healthy])
+    for record in (*given, *well):
+        refuse_short(record)
+        record.warn()
+        refuse_mismatch(scanner, record)
+    refuse_same((*given, *well))
     progress = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(
-            scanner, observations, progress, of_healthy, longest, parallel=parallel
-        )
+        found = diagnose_scanner(scanner, given, progress, well, longest, parallel=parallel)
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
@@ -259,31 +274,18 @@ def _coupled(
             )
     if not all(error.by_band for error in model.coupled.errors):
         raise InputError(f"{model.origin}: states no error by band: identify it again")
-    found = diagnose_coupled(model.coupled, coupled_records(given), coupled_records(well), progress)
+    found = diagnose_coupled(model.coupled, given, well, progress)
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
     return Diagnosis(extended, given, model, found)
 
 
-def _named(records: Iterable[Record], kind: str) -> Iterator[Record]:
-    for number, record in enumerate(records, start=1):
-        yield record if record.name else evolve(record, name=f"{kind} {number}")
-
-
-def observation_of(record: Record) -> Observation:
-    """Return a record as the core sees it; raises InputError where it is too short."""
+def refuse_short(record: Record) -> None:
+    """Raise InputError where a record is too short for a diagnosis."""
     if len(record.drive) < FEWEST:
         fix = "; ".join((f"record {FEWEST} or more", *record.shortcomings))
         raise InputError(
             f"{record.name}: holds {len(record.drive)} samples of drive and displacement; {fix}"
         )
-    return Observation(
-        record.name,
-        *record.traces(),
-        record.scan,
-        record.kind,
-        tuple(axis for axis in AXES if axis in record.axes),
-        record.start == "depolarised",
-    )
 
 
 def info_of(record: Record) -> ScanInfo:

@@ -2,20 +2,20 @@
 
 from collections.abc import Iterable, Sequence
 
+from attrs import evolve
+
 from afm_scan_ros.core.arguments import RECORDS, all_of_type, whole
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
-from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.identify import identify_records
 from afm_scan_ros.core.identification.state_space.identify import (
     CoupledSetting,
     coupling_is_seen,
     identify_coupled,
 )
-from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
 from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, ProgressCallback
@@ -27,7 +27,7 @@ def of_coupled_axes(records: Sequence[Record]) -> bool:
     axes = {record.axes for record in records}
     if len(axes) > 1 or len(records[0].axes) == 1 or any(record.kind for record in records):
         return False
-    return coupling_is_seen(coupled_records(records))
+    return coupling_is_seen(named(records))
 
 
 def identify_coupled_axes(
@@ -44,21 +44,16 @@ def identify_coupled_axes(
                 f"{other.name}: its axes are {', '.join(other.axes)}, and {', '.join(first.axes)}"
                 f" in {first.name}: give records of the same coupled axes"
             )
-    given = coupled_records(records)
+    given = named(records)
     setting = CoupledSetting(tuple(effects), states)
     scanner = identify_coupled(given, first.axes, setting, progress)
     return Model(scanner, f"identified from {', '.join(one.name for one in given)}")
 
 
-def coupled_records(records: Sequence[Record]) -> list[CoupledRecord]:
-    """Records as the core takes them; one without a name gets a number."""
+def named(records: Iterable[Record], kind: str = "record") -> list[Record]:
+    """Return records of which those without a name have got their number for one."""
     return [
-        CoupledRecord(
-            record.name or f"record {number}",
-            record.drive,
-            record.displacement,
-            record.sample_period,
-        )
+        record if record.name else evolve(record, name=f"{kind} {number}")
         for number, record in enumerate(records, start=1)
     ]
 
@@ -75,31 +70,52 @@ def identify(
 ) -> Model:
     """Identify every axis from whatever records there are of it, of any number and kinds.
 
+    Parameters
+    ----------
+    records
+        What each is for is recognised from its drive where no kind is stated: "creep" for steps,
+        "frequency" for multisines and sweeps, "hysteresis" for reversal curves. All others are
+        ordinary motion, as scans and loops are. One of the kind "validation" fits nothing: the
+        model's error is measured on it, and ``diagnose`` needs that error.
+    progress
+        Is called with what is being fitted.
+    levels
+        Levels of the Everett surfaces along either side, 3 or more.
+    order
+        Poles and zeros of the vibration model; None lets the record choose.
+    delay
+        Whether the vibration takes the record's delay for its own.
+    effects
+        Of coupled axes, what acts in their feedback, of "amplitude_softening" and "maxwell_slip":
+        identified with the vibration, best from records of several amplitudes.
+    states
+        Number of states of the vibration of coupled axes; None chooses it by records held out.
+
+    Returns
+    -------
+    Model
+        ``Model.effects`` states what the records identify; all else is unknown, and is left out of
+        predictions and inverses.
+
+    Raises
+    ------
+    InputError
+        Where a record cannot show what it is for, and for arguments out of range.
+    ScanError
+        Where a fit does not converge.
+
+    Notes
+    -----
+    An axis with one each of creep, frequency and hysteresis is identified from these three, which
+    begin depolarised, at rest at zero. Its further records are held out and give the model's error.
+    The records of any other axis are fitted together.
+
     Records of more than two axes are of coupled ones: of a multisine that drives all of them, each
     of another realisation, in steady state for two periods or more. So are such records of two
     axes, where they show that one drive moves both.
 
-    Arguments:
-        records: what each is for is recognised from its drive where no kind is stated: "creep" for
-            steps, "frequency" for multisines and sweeps, "hysteresis" for reversal curves. All
-            others are ordinary motion, as scans and loops are. One of the kind "validation" fits
-            nothing: the model's error is measured on it, and ``diagnose`` needs that error.
-        progress: is called with what is being fitted.
-        levels: of the Everett surfaces along either side, 3 or more.
-        order: poles and zeros of the vibration model; None lets the record choose.
-        delay: whether the vibration takes the record's delay for its own.
-        effects: of coupled axes, what acts in their feedback, of "amplitude_softening" and
-            "maxwell_slip": identified with the vibration, best from records of several amplitudes.
-        states: of the vibration of coupled axes; None chooses them by records held out.
-
-    An axis with one each of creep, frequency and hysteresis is identified from these three, which
-    begin depolarised, at rest at zero. Its further records are held out and give the model's error.
-    The records of any other axis are fitted together. ``Model.effects`` states what they identify;
-    all else is unknown, and is left out of predictions and inverses.
-
-    Raises InputError where a record cannot show what it is for, and for arguments out of range;
-    ScanError where a fit does not converge.
-
+    Examples
+    --------
     >>> import numpy as np
     >>> import afm_scan_ros as afm
     >>> steps = np.repeat([0.0, 0.5, 1.0, 0.0], 2000)
@@ -120,9 +136,9 @@ def identify(
     several = any(len(record.axes) > len(AXES) for record in given)
     if several or effects or states is not None or of_coupled_axes(given):
         return identify_coupled_axes(given, effects, states, report)
-    checked = [_given(record, number) for number, record in enumerate(given, start=1)]
-    found = identify_records(checked, sizes, report)
-    names = ", ".join(each.recording.name for each in checked)
+    taken = [_given(record) for record in named(given)]
+    found = identify_records(taken, sizes, report)
+    names = ", ".join(each.name for each in taken)
     return Model(found.model, f"identified from {names}", found)
 
 
@@ -136,13 +152,11 @@ def _order_of(given: tuple[int, int] | None) -> Order | None:
     return Order(whole("order, poles", poles, 1), whole("order, zeros", zeros, 0))
 
 
-def _given(record: Record, number: int) -> GivenRecord:
-    """Check a record for what it is to be used for."""
+def _given(record: Record) -> Record:
+    """Return a record that is named by what it is to be used for; raises InputError for a part."""
     if record.missing:
         raise InputError("; ".join((*record.shortcomings, "record it again")))
+    record.warn()
     kind = "frequency" if record.kind in SWEEPS else record.kind
     kind = kind if kind in PLANS else None
-    name = record.name or f"record {number}"
-    axes = tuple(axis for axis in AXES if axis in record.axes)
-    recording = CalibrationRecord(f"{kind} in {name}" if kind else name, *record.traces(), axes)
-    return GivenRecord(recording, kind, record.start == "depolarised")
+    return evolve(record, name=f"{kind} in {record.name}" if kind else record.name, kind=kind)

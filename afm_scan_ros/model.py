@@ -110,12 +110,28 @@ class Model:
         return self._identification
 
     def predict(self, drive: ArrayLike, sample_period: float, *, periodic: bool = False) -> Array:
-        """Return the displacement (m) for a drive (V), of its shape: (n,) or (n, channels).
+        """Return the displacement (m) for a drive (V), from depolarised rest at zero.
 
-        The scanner begins depolarised and at rest at zero; ``sample_period`` is in s. Of coupled
-        axes, a ``periodic`` drive holds whole periods, in steady state. Raises InputError for
-        arrays that are not of the model's axes, and where the drive leaves the range that the model
-        was identified in. Effects that are unknown are left out; a warning in the log names them.
+        Parameters
+        ----------
+        drive
+            V, shape (n,) or (n, channels).
+        sample_period
+            s.
+        periodic
+            Of coupled axes, whether the drive holds whole periods, in steady state.
+
+        Returns
+        -------
+        ndarray
+            m, of the drive's shape. Effects that are unknown are left out; a warning in the log
+            names them.
+
+        Raises
+        ------
+        InputError
+            For arrays that are not of the model's axes, and where the drive leaves the range that
+            the model was identified in.
         """
         if not isinstance(self._scanner, ScannerModel):
             return self._scanner.predict(
@@ -143,23 +159,44 @@ class Model:
         *,
         periodic: bool = False,
     ) -> Array:
-        """Return the drive (V) that makes the scanner follow a displacement (m), of its shape.
+        """Return the drive (V) that makes the scanner follow a displacement (m).
 
-        Arguments:
-            desired: (n,) or (n, channels), from depolarised rest at zero on.
-            sample_period: s.
-            effects: those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each
-                other one counts by its gain at rest, and so does each that is unknown; a warning in
-                the log names these.
-            limits: the amplifier's voltage and slew; none where None.
-            weight: frequency (Hz) above which the inverse of vibration prefers a small drive to a
-                small error; 11 times the first resonance of each axis where None.
-            periodic: of coupled axes, whether ``desired`` is whole periods, in steady state.
+        Parameters
+        ----------
+        desired
+            m, shape (n,) or (n, channels), from depolarised rest at zero on.
+        sample_period
+            s.
+        effects
+            Those to invert, of "creep", "hysteresis" and "vibration"; all where None. Each other
+            one counts by its gain at rest, and so does each that is unknown; a warning in the log
+            names these.
+        limits
+            The amplifier's voltage and slew; none where None.
+        weight
+            Frequency (Hz) above which the inverse of vibration prefers a small drive to a small
+            error; 11 times the first resonance of each axis where None.
+        periodic
+            Of coupled axes, whether ``desired`` is whole periods, in steady state.
 
-        The inverse of coupled axes is that of the whole model in the band that was identified.
-        Raises InputError for arrays that are not of the model's axes and for an unknown effect,
-        ScanError, which names sample and axis, where the drive leaves the limits or the range that
-        the model was identified in.
+        Returns
+        -------
+        ndarray
+            V, of the shape of ``desired``.
+
+        Raises
+        ------
+        InputError
+            For arrays that are not of the model's axes and for an unknown effect.
+        ScanError
+            Where the drive leaves the limits or the range that the model was identified in; it
+            names sample and axis.
+
+        Notes
+        -----
+        The effects are inverted in the order creep, vibration, hysteresis (Croft, Shed and Devasia
+        2001, Eq. 23), vibration by the optimal inverse of Eq. 22. The inverse of coupled axes is
+        that of the whole model in the band that was identified.
         """
         of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
         if not isinstance(self._scanner, ScannerModel):
@@ -193,8 +230,17 @@ class Model:
     def save(self, path: Path | str, heading: str | None = None) -> None:
         """Write the model file ``path`` and its arrays beside it, in place of what is there.
 
-        ``heading`` is the comment at the file's head. Folders that are missing are made. Raises
-        InputError where the files cannot be written.
+        Parameters
+        ----------
+        path
+            The file; folders that are missing are made.
+        heading
+            The comment at the file's head.
+
+        Raises
+        ------
+        InputError
+            Where the files cannot be written.
         """
         file = path_of(path, MODEL_FILE)
         made = heading or f"A scanner's model, written by afm_scan_ros {version()}."
@@ -225,10 +271,25 @@ class Model:
 
 
 def load_model(path: Path | str | None = None) -> Model:
-    """Load a model file; without a path that of the simulated scanner, ``config/model.yaml``.
+    """Load a model file.
 
-    Raises InputError, which names the file, the key and the fix.
+    Parameters
+    ----------
+    path
+        The file; where None, that of the simulated scanner, ``config/model.yaml``.
 
+    Returns
+    -------
+    Model
+        With the covariance and the error that the file states.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read; it names the file, the key and the fix.
+
+    Examples
+    --------
     >>> import afm_scan_ros as afm
     >>> afm.load_model().axes
     ('x', 'y')

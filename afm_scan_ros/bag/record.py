@@ -32,26 +32,43 @@ def read_record(
 ) -> Record:
     r"""Read a record of drive and displacement from a file.
 
-    Arguments:
-        path: a rosbag2 folder, an ``.mcap`` file, or a table: text with any separator and heading,
-            ``.npy``, ``.npz`` or ``.mat``.
-        columns: what the table's columns hold, as ``drive_x=1:V,achieved_x=2:um,time=3:ms``: the
-            number of a column from 1, or its heading, and its unit. Any number of axes, by any
-            names. Not needed where the headings state it, as ``drive_x [V]``.
-        sample_rate: Hz, where no column is ``time``.
-        skip_rows: lines of the table to leave out at the top; a heading is found without.
-        kind: see ``Record``; a bag states it by itself.
-        start: see ``Record``.
-        topics: topics of a bag, as ``{"achieved_displacement": "/lab/position"}``. Not needed where
-            their names or message types say it.
+    Parameters
+    ----------
+    path
+        A rosbag2 folder, an ``.mcap`` file, or a table: text with any separator and heading,
+        ``.npy``, ``.npz`` or ``.mat``.
+    columns
+        What the table's columns hold, as ``drive_x=1:V,achieved_x=2:um,time=3:ms``: the number of a
+        column from 1, or its heading, and its unit. Any number of axes, by any names. Not needed
+        where the headings state it, as ``drive_x [V]``. A unit may have a factor: ``-um`` turns a
+        sensor's sign, ``8um/V`` is for a sensor in V, of which 1 V stands for 8 µm. Where that
+        scale is unknown, any will do: lengths are then relative.
+    sample_rate
+        Hz, where no column is ``time``.
+    skip_rows
+        Lines of the table to leave out at the top; a heading is found without.
+    kind
+        See ``Record``; a bag states it by itself.
+    start
+        See ``Record``.
+    topics
+        Topics of a bag, as ``{"achieved_displacement": "/lab/position"}``. Not needed where their
+        names or message types say it.
 
-    A unit may have a factor: ``-um`` turns a sensor's sign, ``8um/V`` is for a sensor in V, of
-    where 1 V stands for 8 µm. Where that scale is unknown, any will do: lengths are then relative.
-    A bag without ``scan_info`` is taken as sampled just before the converter's update. The
-    record's ``shortcomings`` name what is missing in a bag, or not even in a table's times.
-    Raises InputError, which names file, place and fix, for what cannot be read, and for samples
-    that were taken at a distance from the converter's update.
+    Returns
+    -------
+    Record
+        Its ``shortcomings`` name what is missing in a bag, or not even in a table's times. A bag
+        without ``scan_info`` is taken as sampled just before the converter's update.
 
+    Raises
+    ------
+    InputError
+        For what cannot be read, naming file, place and fix, and for samples that were taken at a
+        distance from the converter's update.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> import afm_scan_ros as afm
     >>> rows = "\n".join(f"{k / 500:.3f};{k / 100:.2f}" for k in range(500))

@@ -13,11 +13,11 @@ from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.paths import write_text
@@ -120,7 +120,7 @@ def _base_model(path: Path) -> ScannerModel:
     return model
 
 
-def _diagnose(model: ScannerModel, records: Sequence[Observation]) -> ScannerDiagnosis:
+def _diagnose(model: ScannerModel, records: Sequence[Record]) -> ScannerDiagnosis:
     with working("diagnosing") as progress:
         return diagnose(model, records, progress)
 

@@ -22,6 +22,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.records.recording import kind_of, problems
 from afm_scan_ros.core.limits import DriveLimits
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import PATTERNS
 from afm_scan_ros.core.types import AXES, Trace
@@ -126,7 +127,8 @@ def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]
     """Yield the worst that keeps a drive and its displacement from being identified."""
     if {"drive_voltage", "achieved_displacement"} <= streams.keys():
         drive, achieved = (streams[s] for s in ("drive_voltage", "achieved_displacement"))
-        yield from islice(problems(drive, achieved, axes), 1)
+        record = Record.of_traces("record", drive, achieved, axes=axes)
+        yield from islice(problems(record), 1)
 
 
 @click.command()

@@ -11,14 +11,14 @@ from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.diagnosis import info_of, observation_of
+from afm_scan_ros.diagnosis import info_of
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
@@ -73,7 +73,7 @@ class RecordedSession:
         self._state(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
-    def experiment(self, plan: Plan[Waveform]) -> Observation:
+    def experiment(self, plan: Plan[Waveform]) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         bag = self.out / "bags" / plan.name
         driven = DrivenScanner(
@@ -82,7 +82,7 @@ class RecordedSession:
         run_calibration(driven, bag.parent, [plan])
         record = read_record(bag)
         self._state(bag, info_of(record), len(record.drive))
-        return observation_of(record)
+        return record
 
     def _state(self, bag: Path, info: ScanInfo, samples: int) -> None:
         self.sources.append(source_of(str(bag), info, samples))

@@ -13,12 +13,12 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.comparison import ScanComparison, compare_scans
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
@@ -65,7 +65,7 @@ MOST_EXPERIMENTS = 2
 """Experiments in a round, at most."""
 
 Scans = Mapping[str, Scan]
-Diagnose = Callable[[ScannerModel, Sequence[Observation]], ScannerDiagnosis]
+Diagnose = Callable[[ScannerModel, Sequence[Record]], ScannerDiagnosis]
 
 
 class ScannerSession(Protocol):
@@ -78,7 +78,7 @@ class ScannerSession(Protocol):
         """
         ...
 
-    def experiment(self, plan: Plan[Waveform]) -> Observation:
+    def experiment(self, plan: Plan[Waveform]) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         ...
 
@@ -133,11 +133,13 @@ def close_loop(
     scan, made with each model in turn, and the experiments.
     """
     believed, scans = model, _scans(session, model, comparisons, 0)
-    fitted: list[Observation] = []
-    experiments: dict[str, Observation] = {}
+    fitted: list[Record] = []
+    experiments: dict[str, Record] = {}
     for number in range(1, rounds + 1):
         scan = scans[FIRST]
-        fitted.append(Observation(f"{FIRST}_{number - 1}", scan.drive, scan.measured, scan.spec))
+        fitted.append(
+            Record.of_traces(f"{FIRST}_{number - 1}", scan.drive, scan.measured, scan.spec)
+        )
         known = len(experiments)
         *_, found = diagnose_until_resolved(session, model, fitted, experiments, diagnose)
         done = _repeated(session, believed, found, tuple(experiments)[known:], scans, number)
@@ -150,8 +152,8 @@ def close_loop(
 def diagnose_until_resolved(
     session: ScannerSession,
     model: ScannerModel,
-    fitted: Sequence[Observation],
-    experiments: dict[str, Observation],
+    fitted: Sequence[Record],
+    experiments: dict[str, Record],
     diagnose: Diagnose,
 ) -> Iterator[ScannerDiagnosis]:
     """Diagnose the residual; repeat with the proposed experiment while the verdict is open.

@@ -338,11 +338,26 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
 
 
 def trajectory(spec: ScanSpec) -> Array:
-    """Return the desired displacement (m) of a whole scan, (n, 2): x and y.
+    """Return the desired displacement of a whole scan.
 
-    It begins and ends at rest at zero, after the preparation, the approach and the settling of
-    ``spec``; its sample period is ``spec.sample_period``.
+    Parameters
+    ----------
+    spec
+        The scan.
 
+    Returns
+    -------
+    ndarray
+        m, shape (n, 2): x and y, every ``spec.sample_period``. It begins and ends at rest at zero,
+        after the preparation, the approach and the settling of ``spec``.
+
+    Raises
+    ------
+    InputError
+        Where ``spec`` is no scan.
+
+    Examples
+    --------
     >>> import afm_scan_ros as afm
     >>> spec = afm.ScanSpec(range_x=10e-6, range_y=10e-6, lines=2, preparation="none")
     >>> desired = afm.trajectory(spec)

@@ -129,7 +129,7 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
 def _records(found: ResidualReport) -> list[Row]:
     began = [map(initial_state_text, found.before[axis]) for axis in found.before]
     return [
-        (record.name, f"{len(record.drive.x):,}", f"{1e6 * record.sample_period:g} µs", *states)
+        (record.name, f"{len(record.drive):,}", f"{1e6 * record.sample_period:g} µs", *states)
         for record, *states in zip(found.diagnosis.observations, *began, strict=True)
     ]
 

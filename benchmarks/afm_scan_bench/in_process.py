@@ -2,22 +2,23 @@
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.records.recording import checked
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 
-def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, CalibrationRecord]:
+def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, Record]:
     """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
     return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}
 
 
-def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> CalibrationRecord:
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
     """Drive a scanner fresh from rest through one plan.
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
     """
-    return CalibrationRecord(plan.name, *drive_through(plan, plant, seed))
+    return checked(Record.of_traces(plan.name, *drive_through(plan, plant, seed)))
 
 
 def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:

@@ -3,9 +3,9 @@
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
@@ -22,16 +22,16 @@ def done() -> Scan:
     return scan(SPEC, ALL)
 
 
-def record(done: Scan, name: str, samples: int | None = None, gain: float = 1.0) -> Observation:
+def record(done: Scan, name: str, samples: int | None = None, gain: float = 1.0) -> Record:
     def part(trace: Trace, factor: float) -> Trace:
         return evolve(trace, x=factor * trace.x[:samples], y=factor * trace.y[:samples])
 
-    return Observation(name, part(done.drive, 1.0), part(done.measured, gain), SPEC)
+    return Record.of_traces(name, part(done.drive, 1.0), part(done.measured, gain), SPEC)
 
 
-def refusal(infos: tuple[ScanInfo, ScanInfo], *records: Observation) -> str:
+def refusal(infos: tuple[ScanInfo, ScanInfo], *records: Record) -> str:
     with pytest.raises(InputError) as refused:
-        refuse_same(infos, records)
+        refuse_same([evolve(each, info=info) for each, info in zip(records, infos, strict=True)])
     return str(refused.value)
 
 
@@ -61,5 +61,5 @@ def test_two_scans_are_two(done: Scan) -> None:
     """Also where imports of two files bear one name."""
     again = scan(SPEC, ALL, seed=2)
     records = record(done, "a"), record(again, "b")
-    refuse_same((INFO, LATER), records)
-    refuse_same([evolve(INFO, start=0)] * 2, records)
+    for infos in ((INFO, LATER), [evolve(INFO, start=0)] * 2):
+        refuse_same([evolve(each, info=info) for each, info in zip(records, infos, strict=True)])

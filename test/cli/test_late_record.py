@@ -11,12 +11,10 @@ from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.identification.findings import UnmodelledDelay
 from afm_scan_ros.core.identification.identify import (
     REQUIRED,
-    GivenRecord,
     Identification,
     identify_records,
 )
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import VIBRATION_ORDER, fit_summary
 from helpers.in_process import default_plant, record
@@ -27,19 +25,20 @@ pytestmark = pytest.mark.evidence
 LATE = 4  # samples of 0.1 ms
 
 
-def late(made: CalibrationRecord) -> CalibrationRecord:
+def late(made: Record) -> Record:
     """The displacement, each sample some samples too late."""
     moved = made.displacement
-    x, y = (np.concatenate([np.full(LATE, axis[0]), axis[:-LATE]]) for axis in (moved.x, moved.y))
-    return evolve(made, displacement=Trace(0, moved.sample_period, x, y))
+    return evolve(
+        made, displacement=np.concatenate([moved[:1].repeat(LATE, axis=0), moved[:-LATE]])
+    )
 
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
     plans = creep(), frequency(), hysteresis_plan(levels=13)
     slow, waves, loops = (record(plan, default_plant(), seed=1) for plan in plans)
-    records = [evolve(made, axes=("x",)) for made in (slow, late(waves), loops)]
-    given = [GivenRecord(made, kind) for made, kind in zip(records, REQUIRED, strict=True)]
+    records = [made.axis("x") for made in (slow, late(waves), loops)]
+    given = [evolve(made, kind=kind) for made, kind in zip(records, REQUIRED, strict=True)]
     return identify_records(given, Sizes(13, None, delay=True))
 
 

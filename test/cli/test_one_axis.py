@@ -12,7 +12,6 @@ from afm_scan_ros import identification as api
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -26,14 +25,14 @@ LEVELS = 13
 
 
 @pytest.fixture(scope="module")
-def records() -> list[CalibrationRecord]:
+def records() -> list[Record]:
     return [record(plan, default_plant(), seed=1) for plan in PLANS]
 
 
-def imported(folder: Path, made: CalibrationRecord, axis: str) -> str:
+def imported(folder: Path, made: Record, axis: str) -> str:
     """Import one axis of a record, the other being absent; return its bag."""
     array = folder / f"{made.name}_{axis}.npy"
-    np.save(array, np.column_stack([made.drive.axis(axis), made.displacement.axis(axis)]))
+    np.save(array, np.column_stack(made.signals(axis)))
     columns = f"drive_{axis}=1:V,achieved_{axis}=2:m"
     rate = repr(1.0 / made.sample_period)
     options = ["--columns", columns, "--sample-rate", rate]
@@ -44,9 +43,9 @@ def imported(folder: Path, made: CalibrationRecord, axis: str) -> str:
     return str(target)
 
 
-def same_as_from_arrays(model: Model, records: list[CalibrationRecord], path: Path) -> None:
+def same_as_from_arrays(model: Model, records: list[Record], path: Path) -> None:
     """See that arrays give the same model bit for bit, although no kind is stated."""
-    given = [Record(r.drive.y, r.displacement.y, r.sample_period, ("y",)) for r in records]
+    given = [evolve(each.axis("y"), name="") for each in records]
     api.identify(given, levels=LEVELS).save(path)
     found, known = (each.scanner.axis("y") for each in (load_model(path), model))
     assert model.axes == ("y",)
@@ -57,9 +56,7 @@ def same_as_from_arrays(model: Model, records: list[CalibrationRecord], path: Pa
 
 
 @pytest.mark.evidence
-def test_one_axis_gives_its_report_and_its_model(
-    records: list[CalibrationRecord], tmp_path: Path
-) -> None:
+def test_one_axis_gives_its_report_and_its_model(records: list[Record], tmp_path: Path) -> None:
     bags = {made.name: imported(tmp_path, made, "y") for made in records}
     out = tmp_path / "model.yaml"
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
@@ -75,7 +72,7 @@ def test_one_axis_gives_its_report_and_its_model(
 
 @pytest.mark.evidence
 def test_each_axis_is_identified_from_whatever_there_is_of_it(
-    records: list[CalibrationRecord], tmp_path: Path
+    records: list[Record], tmp_path: Path
 ) -> None:
     slow, waves, loops = records
     one = imported(tmp_path, slow, "x")
@@ -107,9 +104,9 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
 
 @pytest.mark.evidence
 def test_what_is_given_beyond_one_of_each_kind_is_held_out_and_gives_the_error(
-    records: list[CalibrationRecord],
+    records: list[Record],
 ) -> None:
-    given = [Record(r.drive.y, r.displacement.y, r.sample_period, ("y",)) for r in records]
+    given = [evolve(each.axis("y"), name="") for each in records]
     spec = ScanSpec(range_y=10e-6, range_x=10e-6, lines=4)
     healthy = scan(spec, ())
     more = Record(healthy.drive.y, healthy.measured.y, spec.sample_period, ("y",), name="healthy")

@@ -7,12 +7,12 @@ from attrs import define, field
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.records.recording import checked
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import Array, Trace
@@ -88,22 +88,22 @@ class InProcessSession:
         seed = self._next_seed()
         return scan(spec, ALL, InverseSettings(), self.plant, model, seed, correction)
 
-    def experiment(self, plan: Plan[Waveform]) -> Observation:
+    def experiment(self, plan: Plan[Waveform]) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         drive, measured = drive_through(plan, self.plant, self._next_seed())
-        return Observation(plan.name, drive, measured, experiment=plan.name)
+        return Record.of_traces(plan.name, drive, measured, kind=plan.name)
 
     def _next_seed(self) -> int:
         self._made += 1
         return self.seed + self._made - 1
 
 
-def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> CalibrationRecord:
+def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
     """Drive a scanner fresh from rest through one plan.
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
     """
-    return CalibrationRecord(plan.name, *drive_through(plan, plant, seed))
+    return checked(Record.of_traces(plan.name, *drive_through(plan, plant, seed)))
 
 
 def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:

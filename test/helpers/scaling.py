@@ -3,10 +3,10 @@
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.model import AxisModel, EverettSurface, HysteresisModel, ModelDiscrepancy
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.types import Array
 
 
 def scaled_axis(axis: AxisModel, scale: Scale) -> AxisModel:
@@ -32,9 +32,9 @@ def scaled_axis(axis: AxisModel, scale: Scale) -> AxisModel:
     )
 
 
-def scaled_record(record: Observation, scale: Scale) -> Observation:
+def scaled_record(record: Record, scale: Scale) -> Record:
     """Record of a scanner that differs in scale alone."""
-    spec = record.spec
+    spec = record.scan
     assert spec is not None
     lengths = ("range_x", "range_y", "preparation_lower", "preparation_upper")
     times = ("approach", "settle", "y_step")
@@ -42,14 +42,13 @@ def scaled_record(record: Observation, scale: Scale) -> Observation:
     changed = {name: scale.length * getattr(spec, name) for name in lengths}
     changed |= {name: scale.time * getattr(spec, name) for name in times}
     changed |= {name: getattr(spec, name) / scale.time for name in rates}
-    drive = scaled_trace(record.drive, scale.voltage, scale.time)
-    moved = scaled_trace(record.displacement, scale.length, scale.time)
-    return evolve(record, drive=drive, displacement=moved, spec=evolve(spec, **changed))
-
-
-def scaled_trace(trace: Trace, size: float, time: float) -> Trace:
-    """Trace of other units."""
-    return Trace(trace.first_sample, time * trace.sample_period, size * trace.x, size * trace.y)
+    return evolve(
+        record,
+        drive=scale.voltage * record.drive,
+        displacement=scale.length * record.displacement,
+        sample_period=scale.time * record.sample_period,
+        scan=evolve(spec, **changed),
+    )
 
 
 def _slowed(polynomial: tuple[float, ...], count: int, time: float) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Multisine, Waypoints
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo
 
 
@@ -28,8 +28,8 @@ def frequency() -> Plan[Multisine]:
     return Plan("frequency", multisines, multisines)
 
 
-def bag(folder: Path, made: CalibrationRecord) -> Path:
-    drive, displacement = made.drive, made.displacement
+def bag(folder: Path, made: Record) -> Path:
+    drive, displacement = made.traces()
     info = ScanInfo("s", 0, made.name, drive.sample_period, len(drive.x))
     with ScanWriter(folder / made.name, info) as writer:
         writer.add("drive_voltage", drive)

@@ -10,7 +10,6 @@ import afm_scan_ros as afm
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
@@ -20,6 +19,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
 from afm_scan_ros.core.identification.drives.experiments import KINDS, SWEEPS
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Trace
@@ -146,11 +146,13 @@ def test_records_and_a_model_that_share_no_axis_are_refused(done: Scan) -> None:
         afm.diagnose(ALONE, [y])
 
 
-def seen(done: Scan, model: ScannerModel, first: int = 0, **further: bool) -> CandidateFitter:
+def seen(
+    done: Scan, model: ScannerModel, first: int = 0, start: str = "unknown"
+) -> CandidateFitter:
     drive, moved = (
         Trace(0, t.sample_period, t.x[first:], t.y[first:]) for t in (done.drive, done.measured)
     )
-    observed = Observation("scan", drive, moved, **further)
+    observed = Record.of_traces("scan", drive, moved, start=start)
     return CandidateFitter((evidence_of("x", model, observed),), chain_of(model.axis("x")))
 
 
@@ -173,6 +175,6 @@ def test_no_coupling_to_an_absent_axis_is_tried(done: Scan) -> None:
 def test_a_record_known_to_begin_depolarised_is_not_doubted(done: Scan) -> None:
     """Cut out of a scan it does not begin so, which its first turns show."""
     middle = len(done.drive.x) // 2
-    begun = (seen(done, ALONE.scanner, middle, depolarised=d) for d in (False, True))
+    begun = (seen(done, ALONE.scanner, middle, start=s) for s in ("unknown", "depolarised"))
     estimated, stated = (bench.evidence[0].playback.initial_state.blank for bench in begun)
     assert (estimated, stated) == (False, True)

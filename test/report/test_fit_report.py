@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
 from afm_scan_ros.core.identification.drives.waveforms import Waypoints
 from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
 from afm_scan_ros.core.identification.identify import (
-    GivenRecord,
     Identification,
     identify_records,
 )
@@ -33,7 +33,7 @@ def short_creep() -> Plan[Waypoints]:
 @pytest.fixture(scope="module")
 def found() -> Identification:
     plans = short_creep(), frequency(), hysteresis_plan(levels=7)
-    made = [GivenRecord(record(plan, default_plant(), seed=1), plan.name) for plan in plans]
+    made = [evolve(record(plan, default_plant(), seed=1), kind=plan.name) for plan in plans]
     return identify_records(made, Sizes(levels=13))
 
 

@@ -12,9 +12,10 @@ from attrs import evolve
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import InitialState, Observation
+from afm_scan_ros.core.diagnosis.records import InitialState
 from afm_scan_ros.core.diagnosis.residual_report import describe
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -30,21 +31,21 @@ SPEC = ScanSpec(lines=4, samples_per_line=2000)
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Observation:
+def healthy() -> Record:
     done = scan(SPEC, ALL)
-    return Observation("scan", done.drive, done.measured, SPEC)
+    return Record.of_traces("scan", done.drive, done.measured, SPEC)
 
 
-def messages_of(healthy: Observation, error: Array) -> str:
+def messages_of(healthy: Record, error: Array) -> str:
     """Words on x, of which the sensor shows something in addition."""
-    wrong = evolve(healthy.displacement, x=healthy.displacement.x + error)
+    wrong = healthy.displacement + np.outer(error, [1.0, 0.0])
     observed = evolve(healthy, displacement=wrong)
     evidence = evidence_of("x", default_model(), observed)
     described = describe(evidence, chain_of(default_model().x), observed)
     return " ".join(residual_text(described, evidence.limit))
 
 
-def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
+def trace_of(records: Sequence[Record]) -> AxisDiagnosis:
     """Axis x of several records, with nothing kept."""
     evidence = tuple(evidence_of("x", default_model(), each, i) for i, each in enumerate(records))
     chain = chain_of(default_model().x)
@@ -53,11 +54,11 @@ def trace_of(records: Sequence[Observation]) -> AxisDiagnosis:
     return AxisDiagnosis("x", evidence, chain, chain, chain, none, ())
 
 
-def seconds(healthy: Observation) -> Array:
-    return np.arange(len(healthy.drive.x)) * healthy.sample_period
+def seconds(healthy: Record) -> Array:
+    return np.arange(len(healthy.drive)) * healthy.sample_period
 
 
-def test_a_disturbance_is_a_line(healthy: Observation) -> None:
+def test_a_disturbance_is_a_line(healthy: Record) -> None:
     message = messages_of(healthy, 2e-7 * np.sin(2.0 * np.pi * 47.0 * seconds(healthy)))
     size = re.search(r"whole record: (46.9.?|47.*?) Hz \((\d+) nm rms\)", message)
     assert size is not None, message
@@ -65,7 +66,7 @@ def test_a_disturbance_is_a_line(healthy: Observation) -> None:
     assert "largest band is 30 to 99.9 Hz" in message
 
 
-def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Observation) -> None:
+def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Record) -> None:
     """A window would give 200 nm for what is there for a quarter of the record."""
     time = seconds(healthy)
     there = np.abs(time - time.mean()) < time[-1] / 8.0
@@ -77,7 +78,7 @@ def test_a_line_that_comes_and_goes_is_no_larger_than_the_residual(healthy: Obse
     assert 60.0 < float(lines[0]) <= float(rms[1])
 
 
-def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Observation) -> None:
+def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Record) -> None:
     time = seconds(healthy)
     apart = 3.0 / time[-1]
     pair = (np.sin(2.0 * np.pi * rate * time) for rate in (470.0, 470.0 + apart))
@@ -89,8 +90,8 @@ def test_two_adjacent_lines_are_no_more_than_the_residual(healthy: Observation) 
     assert np.linalg.norm(sizes) <= 1.01 * float(rms[1])
 
 
-def test_of_several_records_it_says_which_is_described(healthy: Observation) -> None:
-    wrong = evolve(healthy.displacement, x=healthy.displacement.x + 1e-6 * seconds(healthy))
+def test_of_several_records_it_says_which_is_described(healthy: Record) -> None:
+    wrong = healthy.displacement + np.outer(1e-6 * seconds(healthy), [1.0, 0.0])
     records = healthy, evolve(healthy, name="late", displacement=wrong)
     trace = trace_of(records)
     message = chosen_text(trace)
@@ -99,35 +100,35 @@ def test_of_several_records_it_says_which_is_described(healthy: Observation) -> 
     assert not chosen_text(trace_of(records[:1]))
 
 
-def test_drift_moves_whole_lines(healthy: Observation) -> None:
+def test_drift_moves_whole_lines(healthy: Record) -> None:
     message = messages_of(healthy, 1e-6 * seconds(healthy))
     assert "one quantity alone explains: time (100%)" in message
     assert "preparation of a scan differs from its lines" in message
 
 
-def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Observation) -> None:
+def test_a_lag_is_a_matter_of_direction_and_speed(healthy: Record) -> None:
     message = messages_of(
-        healthy, -1e-4 * np.gradient(healthy.displacement.x, healthy.sample_period)
+        healthy, -1e-4 * np.gradient(healthy.signals("x")[1], healthy.sample_period)
     )
     assert "it depends on direction" in message
     assert "one quantity alone explains: speed" in message
 
 
-def test_a_bent_sensor_is_a_matter_of_place(healthy: Observation) -> None:
-    message = messages_of(healthy, 1e3 * healthy.displacement.x**2)
+def test_a_bent_sensor_is_a_matter_of_place(healthy: Record) -> None:
+    message = messages_of(healthy, 1e3 * healthy.signals("x")[1] ** 2)
     assert "it depends on position." in message
     assert "one quantity alone explains: position" in message
 
 
-def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Observation) -> None:
-    message = messages_of(healthy, np.zeros(len(healthy.drive.x)))
+def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Record) -> None:
+    message = messages_of(healthy, np.zeros(len(healthy.drive)))
     outside = re.search(r"(\d+)% of its autocorrelation", message)
     assert outside is not None
     assert int(outside[1]) > 50
     assert "model discrepancy is not white noise" in message
 
 
-def test_records_that_are_no_scans_are_drawn_too(healthy: Observation) -> None:
+def test_records_that_are_no_scans_are_drawn_too(healthy: Record) -> None:
     evidence = evidence_of("x", default_model(), healthy)
     described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
     assert described.sides is None

@@ -22,11 +22,12 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, TYPICAL_SHARE, known_variance
 from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
-from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
+from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array, ProgressCallback
 
@@ -224,7 +225,7 @@ class AxisDiagnosis:
 
 
 def diagnose_axis(
-    axis: str, model: ScannerModel, observations: Sequence[Observation], progress: ProgressCallback
+    axis: str, model: ScannerModel, observations: Sequence[Record], progress: ProgressCallback
 ) -> AxisDiagnosis:
     """Find the effects that the model of one axis lacks, from the residuals of the records.
 

@@ -23,7 +23,6 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
 )
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.scale import length_scale
@@ -32,6 +31,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -55,14 +55,14 @@ SAME_SHAPE, LEAST_CORRELATION = 0.95, 0.7
 that they have at some delay: a slew limit makes motion small and late."""
 
 
-def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
+def refuse_mismatch(model: ScannerModel, observed: Record) -> None:
     """Refuse a record that is of another scanner or axis, or in other units.
 
     Raises InputError, which names the record, the axis and the fix; also where the drive leaves
     the range that the model was identified in.
     """
     try:
-        predicted = _driven(model, observed.drive)
+        predicted = _driven(model, observed.traces()[0])
     except BeyondRangeError as error:
         raise InputError(
             f"{observed.name}: the drive is {error.value:.4g} V at sample {error.sample}, and the"
@@ -70,7 +70,7 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
             " identify the model to a larger one"
         ) from error
     for axis in (name for name in model.axes if name in observed.axes):
-        measured = observed.displacement.axis(axis)
+        drive, measured = observed.signals(axis)
         slow = _below_resonance(model.axis(axis).vibration, observed.sample_period, len(measured))
         signals = predicted[axis], measured
         if slow is not None:
@@ -80,7 +80,7 @@ def refuse_mismatch(model: ScannerModel, observed: Observation) -> None:
         visible = VISIBLE * length_scale(model.axis(axis))
         _refuse_unlike(f"{observed.name}: axis {axis}", *signals, visible)
         if float(signals[0].std()) >= visible:
-            _refuse_backward(f"{observed.name}: axis {axis}", observed.drive.axis(axis), *signals)
+            _refuse_backward(f"{observed.name}: axis {axis}", drive, *signals)
 
 
 def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array | None:
@@ -250,7 +250,7 @@ def _above(axis: str, diagnosed: AxisDiagnosis) -> Iterator[Caution]:
         yield AboveDetectionLimit(axis, name, float(ratio[band]), low, high, others)
 
 
-def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> ScannerModel:
+def with_healthy(model: ScannerModel, healthy: Sequence[Record]) -> ScannerModel:
     """Return the model with its errors on ordinary records, of the axes that they drive.
 
     Raises InputError where a drive leaves the identified range.
@@ -262,7 +262,7 @@ def with_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Scanner
     return model
 
 
-def unlike_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Iterator[UnlikeHealthy]:
+def unlike_healthy(model: ScannerModel, healthy: Sequence[Record]) -> Iterator[UnlikeHealthy]:
     """Yield the records that neither the model explains nor the other healthy records.
 
     Such a record raises the detection limit, and may hide what it is to show. The model is asked
@@ -280,10 +280,10 @@ def unlike_healthy(model: ScannerModel, healthy: Sequence[Observation]) -> Itera
                 yield UnlikeHealthy(name, one.name, float(ratio[band]), *edges)
 
 
-def _driving(healthy: Sequence[Observation], axis: str) -> list[Observation]:
-    return [one for one in healthy if axis in one.axes and np.ptp(one.drive.axis(axis))]
+def _driving(healthy: Sequence[Record], axis: str) -> list[Record]:
+    return [one for one in healthy if axis in one.axes and np.ptp(one.signals(axis)[0])]
 
 
-def _record(one: Observation, axis: str) -> AnyRecord:
-    signals = AxisRecord(one.drive.axis(axis), one.displacement.axis(axis), one.sample_period)
+def _record(one: Record, axis: str) -> AnyRecord:
+    signals = AxisRecord.of(one, axis)
     return AnyRecord(f"healthy: {one.name}", None, signals, one.depolarised)

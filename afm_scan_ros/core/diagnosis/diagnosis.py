@@ -30,7 +30,6 @@ from afm_scan_ros.core.diagnosis.experiments import (
     hypotheses,
     propose,
 )
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import (
     Alternative,
     IdentifiedEffect,
@@ -42,6 +41,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import ProgressCallback
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
@@ -60,7 +60,7 @@ class ScannerDiagnosis:
     ``unlike`` are the healthy records that the model does not explain.
     """
 
-    observations: tuple[Observation, ...]
+    observations: tuple[Record, ...]
     by_axis: dict[str, AxisDiagnosis]
     model: ScannerModel
     verdict: str
@@ -113,9 +113,9 @@ class ScannerDiagnosis:
 
 def diagnose(
     model: ScannerModel,
-    observations: Sequence[Observation],
+    observations: Sequence[Record],
     progress: ProgressCallback = lambda _: None,
-    healthy: Sequence[Observation] = (),
+    healthy: Sequence[Record] = (),
     longest: float = LONGEST,
     *,
     parallel: bool = True,
@@ -158,7 +158,7 @@ def extended_model(model: ScannerModel, by_axis: dict[str, AxisDiagnosis]) -> Sc
     )
 
 
-def _axes_of_all(model: ScannerModel, observations: Sequence[Observation]) -> list[str]:
+def _axes_of_all(model: ScannerModel, observations: Sequence[Record]) -> list[str]:
     """Axes that the model and all records hold; raises InputError where there is none."""
     axes = [name for name in model.axes if all(name in o.axes for o in observations)]
     if not axes:
@@ -188,11 +188,11 @@ def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
 def _proposals(
     model: ScannerModel,
     by_axis: dict[str, AxisDiagnosis],
-    observations: Sequence[Observation],
+    observations: Sequence[Record],
     longest: float,
 ) -> Iterator[Proposal]:
     """Yield experiments not recorded yet, for the axis of the most severe verdict first."""
-    recorded = {observed.experiment for observed in observations}
+    recorded = {observed.kind for observed in observations}
     names = [name for name in EXPERIMENTS if name not in recorded]
     by_severity = sorted(by_axis.values(), key=lambda t: SEVERITY.index(t.verdict), reverse=True)
     for diagnosed in by_severity:

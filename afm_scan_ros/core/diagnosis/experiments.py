@@ -32,7 +32,6 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     known_variance,
 )
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.search import OUTSIDE
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import half_range_of
@@ -40,6 +39,7 @@ from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import Array, Trace
 
@@ -228,7 +228,7 @@ def assess(
     drive = Trace(0, step * plan.sample_period, whole.x[::step], whole.y[::step])
     try:
         moved = predict(model, drive)
-        record = Observation(experiment.name, drive, moved, depolarised=True)
+        record = Record.of_traces(experiment.name, drive, moved, start="depolarised")
         seen = evidence_of(axis, model, record)
         bits, probability = _expected(seen, chain_of(model.axis(axis)), credible)
     except BeyondRangeError:

@@ -25,12 +25,13 @@ from afm_scan_ros.core.diagnosis.records import (
     DEPOLARISED,
     AxisSignals,
     InitialState,
-    Observation,
     Playback,
+    repetition_rates,
 )
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 
@@ -111,7 +112,7 @@ LEAST_MOTION = 100.0
 """Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
 
 
-def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: int = 0) -> Evidence:
+def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from its estimated initial hysteresis state.
 
     A record without preparation steps at its first move. ``number`` is the record's place among
@@ -124,16 +125,16 @@ def evidence_of(axis: str, model: ScannerModel, observed: Observation, number: i
     playback = _playback(chain, view, known, observed)
     limit = _detection_limit(playback, chain, known)
     untested = _untested(playback, chain, known, limit)
-    if observed.spec:
+    if observed.scan:
         return Evidence(playback, limit, untested)
     duration = len(view.measured) * view.sample_period
     return Evidence(playback, limit.unprepared(duration), untested)
 
 
-def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
+def _other(axis: str, model: ScannerModel, observed: Record) -> Array:
     """Displacement (n,) in m of the other axis without coupling; zero where the model lacks it."""
     (other,) = (name for name in AXES if name != axis)
-    still = np.zeros(fast_length(len(observed.drive.x)))
+    still = np.zeros(fast_length(len(observed.drive)))
     if other not in model.axes:
         return still
     alone = evolve(chain_of(model.axis(other)), coupling=())
@@ -141,17 +142,14 @@ def _other(axis: str, model: ScannerModel, observed: Observation) -> Array:
     return played.displacement(evolve(alone, output=()))
 
 
-def _axis_signals(observed: Observation, axis: str, other: Array) -> AxisSignals:
-    drive, measured = (
-        trace.axis(axis)[: len(other)] for trace in (observed.drive, observed.displacement)
-    )
-    return AxisSignals(
-        observed.name, observed.sample_period, drive, measured, other, rates=observed.rates
-    )
+def _axis_signals(observed: Record, axis: str, other: Array) -> AxisSignals:
+    drive, measured = (signal[: len(other)] for signal in observed.signals(axis))
+    rates = repetition_rates(observed)
+    return AxisSignals(observed.name, observed.sample_period, drive, measured, other, rates=rates)
 
 
 def _playback(
-    chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy], observed: Observation
+    chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy], observed: Record
 ) -> Playback:
     begun = DEPOLARISED if observed.depolarised else estimate_initial_state(chain, view, known)
     return Playback(view, begun)

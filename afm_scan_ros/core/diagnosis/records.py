@@ -13,52 +13,18 @@ from attrs import define, field, frozen
 from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.residual_features import prominent_lines
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array, Trace, floats
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.types import AXES, Array, floats
 
 
-@frozen(eq=False)
-class Observation:
-    """Drive (V) and measured displacement (m) of one record, from its first sample on.
-
-    ``spec`` is that of a scan, None for any other record. ``experiment`` is the name of a proposed
-    experiment. ``axes`` are the recorded ones; the other one is zero. ``depolarised`` states the
-    initial state. Raises InputError, which names the record, where drive and displacement differ
-    in samples or period.
-    """
-
-    name: str
-    drive: Trace
-    displacement: Trace
-    spec: ScanSpec | None = None
-    experiment: str | None = None
-    axes: tuple[str, ...] = AXES
-    depolarised: bool = False
-
-    def __attrs_post_init__(self) -> None:
-        counts = {len(t.axis(a)) for t in (self.drive, self.displacement) for a in ("x", "y")}
-        if len(counts) != 1 or self.drive.sample_period != self.displacement.sample_period:
-            raise InputError(
-                f"{self.name}: drive and displacement must have the same samples, found"
-                f" {', '.join(str(c) for c in sorted(counts))} of them, every"
-                f" {self.drive.sample_period:g} and {self.displacement.sample_period:g} s"
-            )
-
-    @property
-    def sample_period(self) -> float:
-        """Seconds between samples."""
-        return self.drive.sample_period
-
-    @property
-    def rates(self) -> tuple[float, ...]:
-        """Rates (Hz) at which the motion repeats: a scan's line rate, else spectral lines."""
-        if self.spec:
-            lines = self.spec.line_rate
-            of_y = (lines * (1.0 - 1.0 / self.spec.lines),)
-            return (lines, *(of_y if self.spec.pattern == "lissajous" else ()))
-        lined = (prominent_lines(self.drive.axis(a), self.sample_period) for a in AXES)
-        return tuple(rate for found in lined for rate in found)
+def repetition_rates(record: Record) -> tuple[float, ...]:
+    """Rates (Hz) at which the motion repeats: a scan's line rate, else spectral lines."""
+    if record.scan:
+        lines = record.scan.line_rate
+        of_y = (lines * (1.0 - 1.0 / record.scan.lines),)
+        return (lines, *(of_y if record.scan.pattern == "lissajous" else ()))
+    lined = (prominent_lines(record.signals(axis)[0], record.sample_period) for axis in AXES)
+    return tuple(rate for found in lined for rate in found)
 
 
 @frozen(eq=False)

@@ -24,9 +24,10 @@ from afm_scan_ros.core.diagnosis.description import (
 )
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.records import AxisSignals, InitialState, Observation
+from afm_scan_ros.core.diagnosis.records import AxisSignals, InitialState
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
 from afm_scan_ros.core.effects.residual_features import prominent_lines
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array
 
 SEED = 7
@@ -68,7 +69,7 @@ class Description:
         return float(np.sqrt(np.mean(self.residual**2)))
 
 
-def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Description:
+def describe(evidence: Evidence, chain: Chain, observed: Record) -> Description:
     """Describe the residual of a chain on the axis and record of ``evidence``."""
     playback, limit = evidence.playback, evidence.limit
     view, period = playback.view, playback.view.sample_period
@@ -88,15 +89,15 @@ def describe(evidence: Evidence, chain: Chain, observed: Observation) -> Descrip
         coherences={n: coherence(residual, s, period, limit.edges) for n, s in moving.items()},
         dependences=dependences(residual, moved, period),
         lines=_lines(residual, period),
-        repeats=locked(residual, observed.spec) if observed.spec else None,
-        sides=to_and_fro(residual, observed.spec) if observed.spec else None,
+        repeats=locked(residual, observed.scan) if observed.scan else None,
+        sides=to_and_fro(residual, observed.scan) if observed.scan else None,
     )
 
 
-def _signals(view: AxisSignals, observed: Observation) -> Iterator[tuple[str, Array]]:
+def _signals(view: AxisSignals, observed: Record) -> Iterator[tuple[str, Array]]:
     """Yield the signals that may cause a residual: each drive, and the other axis' motion."""
     for axis in AXES:
-        yield f"drive {axis}", observed.drive.axis(axis)[: len(view.drive)]
+        yield f"drive {axis}", observed.signals(axis)[0][: len(view.drive)]
     yield "displacement of the other axis", view.other
 
 

@@ -35,7 +35,6 @@ from afm_scan_ros.core.identification.hysteresis.everett_fit import (
 from afm_scan_ros.core.identification.hysteresis.everett_least_squares import FittedSurface
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurves
 from afm_scan_ros.core.identification.records.hum import HumLine, without_hum
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
 from afm_scan_ros.core.identification.vibration.frequency_response import frequency_response
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import (
@@ -52,6 +51,7 @@ from afm_scan_ros.core.identification.vibration.structure import (
     record_delay,
 )
 from afm_scan_ros.core.model import EXACT, CreepModel, HysteresisModel, VibrationModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
 CORNER = 0.88
@@ -134,10 +134,9 @@ class AxisRecord:
     sample_period: float
 
     @classmethod
-    def of(cls, recording: CalibrationRecord, axis: str) -> "AxisRecord":
-        """Take axis ``"x"`` or ``"y"`` of a recording."""
-        drive, displacement = recording.drive.axis(axis), recording.displacement.axis(axis)
-        return cls(drive, displacement, recording.sample_period)
+    def of(cls, record: Record, axis: str) -> "AxisRecord":
+        """Take axis ``"x"`` or ``"y"`` of a record."""
+        return cls(*record.signals(axis), record.sample_period)
 
     def without_hum(self) -> "tuple[AxisRecord, tuple[HumLine, ...]]":
         """Return the record without the hum in it, and that hum."""

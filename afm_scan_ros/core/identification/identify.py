@@ -43,7 +43,7 @@ from afm_scan_ros.core.identification.joint.axis import (
     identify_jointly,
 )
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord, misfit
+from afm_scan_ros.core.identification.records.recording import checked, misfit
 from afm_scan_ros.core.identification.statuses import (
     creep_status,
     hysteresis_status,
@@ -55,6 +55,7 @@ from afm_scan_ros.core.identification.vibration.frequency_response import respon
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.model import AxisModel, BaseEffects, HysteresisModel, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback
 
 DEFAULT_SIZES = Sizes()
@@ -87,28 +88,17 @@ class AxisIdentification:
         return self.report.warnings
 
 
-@frozen(eq=False)
-class GivenRecord:
-    """A record of any kind. Its drives show the kind where it is not stated.
+def _of_axis(record: Record, axis: str) -> AnyRecord:
+    """Return what a record holds of an axis. Its drive shows its kind where that is not stated.
 
-    ``depolarised`` is whether the scanner is known to begin so.
+    Steps that are held too shortly to show creep show the ring-down; those of a staircase are
+    motion, as that of a scan's slow axis.
     """
-
-    recording: CalibrationRecord
-    kind: str | None = None
-    depolarised: bool = False
-
-    def of_axis(self, axis: str) -> AnyRecord:
-        """Return what the record holds of an axis.
-
-        Steps that are held too shortly to show creep show the ring-down; those of a staircase are
-        motion, as that of a scan's slow axis.
-        """
-        signals = AxisRecord.of(self.recording, axis)
-        kind = self.kind or recognised(signals.drive)
-        if self.kind is None and kind == "creep":
-            kind = _kind_of_steps(signals)
-        return AnyRecord(self.recording.name, kind, signals, self.depolarised)
+    signals = AxisRecord.of(record, axis)
+    kind = record.kind or recognised(signals.drive)
+    if record.kind is None and kind == "creep":
+        kind = _kind_of_steps(signals)
+    return AnyRecord(record.name, kind, signals, record.depolarised)
 
 
 def _kind_of_steps(signals: AxisRecord) -> str | None:
@@ -135,7 +125,7 @@ class Identification:
 
 
 def identify_records(
-    records: Sequence[GivenRecord],
+    records: Sequence[Record],
     sizes: Sizes = DEFAULT_SIZES,
     progress: ProgressCallback = lambda _: None,
 ) -> Identification:
@@ -147,8 +137,9 @@ def identify_records(
     InputError where a record cannot show what it is for, ScanError where a fit does not converge.
     """
     full, joint = {}, {}
+    given = [checked(record) for record in records]
     for axis in AXES:
-        of_axis = [given.of_axis(axis) for given in records if axis in given.recording.axes]
+        of_axis = [_of_axis(record, axis) for record in given if axis in record.axes]
         if not of_axis:
             continue
         with _naming(axis), _naming_records(of_axis):

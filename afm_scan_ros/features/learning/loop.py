@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.trajectory import phases
@@ -209,11 +209,11 @@ def best_of(scans: list[LearningScan]) -> LearningScan:
     return min(scans, key=lambda done: sum(error**2 for error in done.errors.values()))
 
 
-def observations(scans: list[LearningScan]) -> list[Observation]:
+def observations(scans: list[LearningScan]) -> list[Record]:
     """Return the first scan and the best one as records for a diagnosis."""
     chosen = {"first": scans[0], "learned": best_of(scans)}
     return [
-        Observation(name, done.scan.drive, done.scan.measured, done.scan.spec)
+        Record.of_traces(name, done.scan.drive, done.scan.measured, done.scan.spec)
         for name, done in chosen.items()
     ]
 

@@ -72,20 +72,41 @@ def learn(
 ) -> Learned:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
-    Arguments:
-        model: of x and y; its inverse makes each drive.
-        spec: the scan.
-        measure: drives the scanner and returns what its sensor measured: V to m, both (n, 2), from
-            rest to rest, at ``spec.sample_period``.
-        scans: how many; the first two have no correction, and their difference is taken as noise.
-        limits: the amplifier's voltage and slew; none where None.
-        progress: is called with what is being done.
+    Parameters
+    ----------
+    model
+        Of x and y; its inverse makes each drive.
+    spec
+        The scan.
+    measure
+        Drives the scanner and returns what its sensor measured: V to m, both (n, 2), from rest to
+        rest, at ``spec.sample_period``.
+    scans
+        How many; the first two have no correction, and their difference is taken as noise.
+    limits
+        The amplifier's voltage and slew; none where None.
+    progress
+        Is called with what is being done.
 
+    Returns
+    -------
+    Learned
+        The correction, and the error of each scan.
+
+    Raises
+    ------
+    InputError
+        For fewer than three scans, a model without an axis and a measurement of another shape.
+    ScanError
+        Where a drive would leave the limits or the identified range.
+
+    Notes
+    -----
     The law is iterative learning control with the model's inverse: D. A. Bristow, M. Tharayil and
-    A. G. Alleyne, IEEE Control Systems 26 (2006) 96. Raises InputError for fewer than three scans,
-    a model without an axis and a measurement of another shape, ScanError where a drive would leave
-    the limits or the identified range.
+    A. G. Alleyne, IEEE Control Systems 26 (2006) 96.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> import afm_scan_ros as afm
     >>> model, noise = afm.load_model(), np.random.default_rng(1)

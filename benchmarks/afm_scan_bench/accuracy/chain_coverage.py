@@ -9,7 +9,7 @@ of another order than the scanner's, none of it is inside.
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_bench.accuracy.coverage import with_bounds
 from afm_scan_bench.accuracy.intervals.vibration import true_figures
@@ -22,7 +22,6 @@ from afm_scan_ros.core.identification.creep.fit import CreepFit
 from afm_scan_ros.core.identification.identify import (
     REQUIRED,
     AxisIdentification,
-    GivenRecord,
     identify_records,
 )
 from afm_scan_ros.core.least_squares import Interval
@@ -78,7 +77,7 @@ def _scanner(seed: int) -> Iterator[Iterator[tuple[str, CoverageComparison]]]:
     """Figures of each axis of a scanner that a seed draws."""
     plant = drawn(default_plant(), np.random.default_rng(seed))
     records = calibrate_in_process(plant, seed)
-    identified = identify_records([GivenRecord(records[kind], kind) for kind in REQUIRED])
+    identified = identify_records([evolve(records[kind], kind=kind) for kind in REQUIRED])
     for axis, found in identified.axes.items():
         yield _vibration(plant.axes()[axis], found, plant.sensor_sensitivity)
         yield _creep(plant.axes()[axis], found.report.creep)

@@ -14,9 +14,9 @@ from afm_scan_ros.core.identification.drives.proposal import (
     coverage,
     propose,
 )
-from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.identify import identify_records
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
 
@@ -55,13 +55,10 @@ def planned_model(hold: float) -> tuple[float, ScannerModel]:
     survey = record(first.plan, default_plant(), SEED)
     proposed = propose(CONVERTER, hold, RANGE, combined([_covered(survey)]))
     plans = [each.plan for each in proposed]
-    records = [GivenRecord(record(plan, default_plant(), SEED), plan.name) for plan in plans]
+    records = [evolve(record(plan, default_plant(), SEED), kind=plan.name) for plan in plans]
     seconds = first.seconds + sum(each.seconds for each in proposed)
     return seconds / 60.0, identify_records(records).model
 
 
-def _covered(found: CalibrationRecord) -> Coverage:
-    return combined(
-        coverage(found.drive.axis(axis), found.displacement.axis(axis), found.sample_period)
-        for axis in AXES
-    )
+def _covered(found: Record) -> Coverage:
+    return combined(coverage(*found.signals(axis), found.sample_period) for axis in AXES)

@@ -42,7 +42,7 @@ def _rows(hold: float) -> Iterator[Row]:
     plan = creep_plan((hold,))
     seen = record(plan, default_plant(), SEED)
     for axis in AXES:
-        fit = fit_creep(seen.drive.axis(axis), seen.displacement.axis(axis), plan.sample_period)
+        fit = fit_creep(*seen.signals(axis), plan.sample_period)
         gain, tau = fit.model.gains[-1], fit.model.time_constants[-1]
         gains = half_width(gain, fit.intervals[f"gain_{fit.order}"])
         taus = half_width(tau, fit.intervals[f"time_constant_{fit.order}"])

@@ -12,7 +12,7 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
-from afm_scan_ros.core.identification.identify import GivenRecord, identify_axis, identify_records
+from afm_scan_ros.core.identification.identify import identify_axis, identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
@@ -42,7 +42,7 @@ def measure() -> Table:
 def scanners() -> dict[str, Callable[[ScanSpec], Scan]]:
     """Identify each scanner from its own four records, and measure how it scans with its model."""
     found = calibrate_in_process(default_plant(), SEED)
-    own = identify_records([GivenRecord(each, kind) for kind, each in found.items()]).model
+    own = identify_records([evolve(each, kind=kind) for kind, each in found.items()]).model
     slip = FamilyScanner.of("slip", "cube behind")
     model = identify_axis(*slip.records().values()).model
     return {

@@ -37,7 +37,7 @@ def measure() -> Table:
     """Fit creep of orders 1 to 5 to a step of the default plant's x, held for five minutes."""
     plan = creep_plan((FIVE_MINUTES,))
     seen = record(plan, default_plant(), SEED)
-    rows = list(_rows(creep_record(seen.drive.x, seen.displacement.x, plan.sample_period)))
+    rows = list(_rows(creep_record(*seen.signals("x"), plan.sample_period)))
     title = "Table 1: error of predicted creep over five minutes, by order"
     return Table("table1", title, COLUMNS, rows)
 

@@ -21,7 +21,6 @@ from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.identify import (
     REQUIRED,
     AxisIdentification,
-    GivenRecord,
     identify_records,
 )
 from afm_scan_ros.core.least_squares import Interval
@@ -44,14 +43,14 @@ MICRO = 1e6
 def measure() -> Table:
     """Calibrate and identify the default plant, and compare with its polynomials."""
     records = calibrate_in_process(default_plant(), SEED)
-    found = identify_records([GivenRecord(records[kind], kind) for kind in REQUIRED])
+    found = identify_records([evolve(records[kind], kind=kind) for kind in REQUIRED])
     rows = [
         {"axis": axis, **row}
         for axis in AXES
         for row in figures(
             default_plant().axes()[axis],
             found.axes[axis],
-            records["frequency"].drive.axis(axis),
+            records["frequency"].signals(axis)[0],
         )
     ]
     return Table("vibration", "Vibration recovered from the default plant", COLUMNS, rows)

@@ -14,9 +14,9 @@ from scipy.stats import f as f_distribution
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
@@ -57,10 +57,10 @@ def ratios(family: str) -> Iterator[Array]:
         size = scanner.reach() * float(rng.uniform(*SHARES))
         spec = evolve(spec_at(rate), lines=lines, range_x=size, range_y=size)
         done = scanner.scan(spec, model)
-        yield _ratio(Observation("scan", done.drive, done.measured, spec), model)
+        yield _ratio(Record.of_traces("scan", done.drive, done.measured, spec), model)
 
 
-def _ratio(observed: Observation, model: AxisModel) -> Array:
+def _ratio(observed: Record, model: AxisModel) -> Array:
     evidence = evidence_of("x", ScannerModel(model, model), observed)
     noisy = evidence.limit.noise / evidence.limit.rms
     return evidence.ratio(chain_of(model))[noisy < OF_DISCREPANCY]

@@ -20,7 +20,6 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.diagnosis import observation_of
 from afm_scan_ros.report.table import Row, Table
 
 Form = tuple[str, str]
@@ -116,11 +115,11 @@ def _drawn(seed: int) -> tuple[str, float, CandidateFitter]:
     laboratory = calibrated(*drawn(seed))
     drives = [laboratory.scan() for _ in range(HEALTHY)]
     healthy, *_ = [laboratory.healthy_record(each) for each in drives]
-    known = [observation_of(each) for each in laboratory.known]
+    known = list(laboratory.known)
     model = with_healthy(laboratory.model.scanner, known)
-    limit = evidence_of("x", model, observation_of(healthy)).limit.total
+    limit = evidence_of("x", model, healthy).limit.total
     truth, times, record = with_effect(laboratory, seed, drives[0], limit)
-    evidence = evidence_of("x", model, observation_of(record))
+    evidence = evidence_of("x", model, record)
     return truth, times, CandidateFitter((evidence,), chain_of(model.axis("x")))
 
 

@@ -26,7 +26,7 @@ from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel,
 from afm_scan_ros.core.identification.state_space.fit import fit_state_space
 from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
-from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord, in_periods, joined
+from afm_scan_ros.core.identification.state_space.spectra import in_periods, joined
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 
@@ -146,7 +146,7 @@ def _fitting_data(amplitudes: tuple[int, ...] = AMPLITUDES) -> Teaching:
     kept = [record(amplitude, k) for amplitude in amplitudes for k in REALISATIONS if k not in FOLD]
     count = len(kept) // len(amplitudes)
     levels = [list(range(k, k + count)) for k in range(0, len(kept), count)]
-    given = [CoupledRecord(r.name, r.drive, r.displacement, r.sample_period) for r in kept]
+    given = kept
     return Teaching.of(in_periods(given), levels)
 
 

@@ -8,7 +8,7 @@ from attrs import evolve
 
 from afm_scan_bench.scans import ALL, BENCH_SPEC, default_model, scan
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.report.table import Row, Table
@@ -56,7 +56,7 @@ def seconds(lines: int) -> tuple[str, int, float, float, float]:
     plant = load_plant(share_directory() / "config/plants/delay_medium.yaml")
     spec = evolve(BENCH_SPEC, lines=lines)
     done = scan(spec, ALL, plant=plant)
-    record = Observation("scan", done.drive, done.measured, spec)
+    record = Record.of_traces("scan", done.drive, done.measured, spec)
     start, before = perf_counter(), process_time()
     found = diagnose(default_model(), [record])
     taken, spent, samples = perf_counter() - start, process_time() - before, len(done.drive.x)

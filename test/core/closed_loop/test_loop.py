@@ -10,13 +10,13 @@ from attrs import define, evolve, field, frozen
 from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
 from afm_scan_ros.core.comparison import compare_scans
 from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
@@ -60,7 +60,7 @@ class Tracing:
     answers: list[Found]
     records: list[list[str]] = field(factory=list)
 
-    def __call__(self, model: ScannerModel, observations: Sequence[Observation]) -> Any:  # noqa: ANN401 - a stand-in
+    def __call__(self, model: ScannerModel, observations: Sequence[Record]) -> Any:  # noqa: ANN401 - a stand-in
         assert model is default_model()
         self.records.append([each.name for each in observations])
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
@@ -116,7 +116,7 @@ class Counting(InProcessSession):
 
     asked: list[str] = field(factory=list)
 
-    def experiment(self, plan: Plan[Waveform]) -> Observation:
+    def experiment(self, plan: Plan[Waveform]) -> Record:
         """Remember the name; do not move."""
         self.asked.append(plan.name)
         return evolve(super().experiment(EXPERIMENTS["rest"].plan()), name=plan.name)

@@ -27,12 +27,12 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     weights,
 )
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import AxisModel, BaseEffects, EffectStatus, ParameterInterval
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -63,7 +63,7 @@ def answer(chain: Chain, drive: Array) -> Array:
 
 
 @cache
-def recorded(factor: float, delay: float = 0.0) -> Observation:
+def recorded(factor: float, delay: float = 0.0) -> Record:
     """A scan of x whose creep's gains are those of the model times a factor."""
     done = scan(SPEC, ALL)
     changed = insert_creep(CHAIN, np.array([factor, 1.0]))
@@ -71,10 +71,10 @@ def recorded(factor: float, delay: float = 0.0) -> Observation:
         changed = effect_type("delay").form("").insert(changed, np.array([delay]))
     more = answer(changed, done.drive.x) - answer(CHAIN, done.drive.x)
     moved = evolve(done.measured, x=done.measured.x + more)
-    return Observation("scan", done.drive, moved, SPEC, axes=("x",))
+    return Record.of_traces("scan", done.drive, moved, SPEC, axes=("x",))
 
 
-def diagnosed(width: float, record: Observation) -> AxisDiagnosis:
+def diagnosed(width: float, record: Record) -> AxisDiagnosis:
     model = evolve(default_model(), x=known(default_model().x, width), y=None)
     return diagnose(model, [record]).by_axis["x"]
 
@@ -149,7 +149,9 @@ def test_the_influence_is_one_standard_deviation_s(place: int, changed: partial[
     record = recorded(1.0)
     free, (evidence,) = with_base_parameters([evidence_of("x", default_model(), record)], chain)
     assert [each.name for each in free] == ["gain_1", "resonance"]
-    more = answer(changed(chain, 0.1), record.drive.x) - answer(chain, record.drive.x)
+    more = answer(changed(chain, 0.1), record.signals("x")[0]) - answer(
+        chain, record.signals("x")[0]
+    )
     count = evidence.base.shape[1]
     np.testing.assert_allclose(evidence.base[place], more[:count], atol=0.05 * np.abs(more).max())
 

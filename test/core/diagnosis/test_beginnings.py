@@ -7,11 +7,11 @@ from attrs import evolve
 from afm_scan_ros.core.closed_loop import FIRST
 from afm_scan_ros.core.diagnosis.candidates import Candidate, CandidateFitter
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array, Trace
@@ -27,7 +27,9 @@ def begun(mechanism: Mechanism, name: str, kind: str) -> Array:
     """Values from which a form is fitted to a scan of the default scanner with a mechanism."""
     plant = evolve(default_plant(), mechanisms=(mechanism,))
     done = InProcessSession(plant).scan(FIRST, SPEC, default_model())
-    seen = evidence_of("x", default_model(), Observation(FIRST, done.drive, done.measured, SPEC))
+    seen = evidence_of(
+        "x", default_model(), Record.of_traces(FIRST, done.drive, done.measured, SPEC)
+    )
     chain, view = chain_of(default_model().x), seen.playback.view
     residual = seen.residual(chain)
     features = ResidualFeatures(
@@ -61,7 +63,7 @@ def test_coupling_is_left_out_of_one_axis_without_a_resonance() -> None:
     drive = np.sin(np.arange(2000) / 100.0)
     driven, moved = Trace(0, 1e-3, drive, 0.0 * drive), Trace(0, 1e-3, 5e-6 * drive, 0.0 * drive)
     model = ScannerModel(x=chain.model)
-    seen = evidence_of("x", model, Observation("one axis", driven, moved))
+    seen = evidence_of("x", model, Record.of_traces("one axis", driven, moved))
     view = seen.playback.view
     features = ResidualFeatures(
         view.sample_period, view.drive, view.measured, seen.residual(chain), view.other, []

@@ -5,9 +5,9 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import report_residual
 from afm_scan_ros.core.model import BaseEffects, EffectStatus, ParameterInterval, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.diagnosis_json import Document, account_document
 from helpers.in_process import ALL, default_model, scan
@@ -23,7 +23,7 @@ def document() -> Document:
     (gain, *_) = axis.creep.gains
     interval = ParameterInterval("gain_1", "1", gain / 1.5, gain * 1.5)
     known = evolve(axis, effects=BaseEffects(EffectStatus(intervals=(interval,))))
-    record = Observation("scan", done.drive, done.measured, spec, axes=("x",))
+    record = Record.of_traces("scan", done.drive, done.measured, spec, axes=("x",))
     return account_document(report_residual(diagnose(ScannerModel(known), [record])))
 
 

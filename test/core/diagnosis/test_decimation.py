@@ -12,9 +12,10 @@ from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import EQUAL_WITHIN, Evidence, decimated
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation, Playback
+from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
@@ -38,7 +39,7 @@ def _six_lines_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def evidence_for(done: Scan, axis: str = "x") -> Evidence:
-    observed = Observation("record", done.drive, done.measured, SPEC)
+    observed = Record.of_traces("record", done.drive, done.measured, SPEC)
     return evidence_of(axis, default_model(), observed)
 
 

@@ -13,8 +13,8 @@ from afm_scan_ros.core.diagnosis.description import (
     to_and_fro,
 )
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.residual_report import Description, describe
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases, total_samples
@@ -146,7 +146,7 @@ def test_coherence_is_one_with_the_cause_and_chance_with_another() -> None:
 @pytest.fixture(scope="module")
 def description() -> Description:
     done = scan(ScanSpec(lines=4, samples_per_line=1000, preparation_cycles=5), ALL)
-    observed = Observation("scan", done.drive, done.measured, done.spec)
+    observed = Record.of_traces("scan", done.drive, done.measured, done.spec)
     evidence = evidence_of("x", default_model(), observed)
     return describe(evidence, chain_of(default_model().x), observed)
 

@@ -11,8 +11,8 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.closed_loop import FIRST
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, detection_limit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
@@ -40,7 +40,7 @@ def _over_limit(spec: ScanSpec) -> float:
     """Return the largest rms of a band over its floor, on either axis."""
     model = default_model()
     done = InProcessSession(default_plant(), 3).scan(FIRST, spec, model)
-    observed = Observation(FIRST, done.drive, done.measured, spec)
+    observed = Record.of_traces(FIRST, done.drive, done.measured, spec)
     evidence = {axis: evidence_of(axis, model, observed) for axis in AXES}
     return max(float(e.ratio(chain_of(model.axis(a))).max()) for a, e in evidence.items())
 

@@ -8,9 +8,9 @@ from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import dither_plan
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter, LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -26,7 +26,7 @@ ODDS = np.log(19.0)
 CHAIN = chain_of(default_model().x)
 
 
-def dithered(*mechanisms: Mechanism) -> Observation:
+def dithered(*mechanisms: Mechanism) -> Record:
     session = InProcessSession(evolve(default_plant(), mechanisms=mechanisms))
     return session.experiment(dither_plan())
 

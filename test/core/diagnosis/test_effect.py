@@ -16,10 +16,10 @@ from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
 from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -41,22 +41,22 @@ def trial(names: tuple[str, ...], bands: BandFit) -> FittedCandidates:
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Observation:
+def healthy() -> Record:
     done = scan(SPEC, ALL)
-    return Observation("scan", done.drive, done.measured, SPEC)
+    return Record.of_traces("scan", done.drive, done.measured, SPEC)
 
 
-def answer(chain: Chain, healthy: Observation) -> Array:
+def answer(chain: Chain, healthy: Record) -> Array:
     cascade = chain.forward(SPEC.sample_period)
-    return cascade.apply(cascade.at_rest(), healthy.drive.x)[1]
+    return cascade.apply(cascade.at_rest(), healthy.signals("x")[0])[1]
 
 
-def traced(healthy: Observation, *names: str, others: tuple[str, ...] = ()) -> AxisDiagnosis:
+def traced(healthy: Record, *names: str, others: tuple[str, ...] = ()) -> AxisDiagnosis:
     """A scan of x with effects that are known, as if they had been found so."""
     none = BandFit(*3 * (np.zeros(0),), 0.0)
     chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, none).fit.rows)
     moved = answer(chain, healthy) - answer(CHAIN, healthy)
-    wrong = evolve(healthy.displacement, x=healthy.displacement.x + moved)
+    wrong = healthy.displacement + np.outer(moved, [1.0, 0.0])
     evidence = (evidence_of("x", default_model(), evolve(healthy, displacement=wrong)),)
     likelihood = Likelihood(evidence, CHAIN)
     reached, without = likelihood.fit(chain), likelihood.fit(CHAIN)
@@ -76,7 +76,7 @@ def mean_square(trace: AxisDiagnosis, residual: Array) -> float:
     return float(np.mean(residual[~trace.evidence[0].fitted] ** 2))
 
 
-def test_the_share_is_what_comes_back_without_the_effect_alone(healthy: Observation) -> None:
+def test_the_share_is_what_comes_back_without_the_effect_alone(healthy: Record) -> None:
     trace = traced(healthy, "drift", "delay")
     (evidence,) = trace.evidence
     before, after = (evidence.residual(c) for c in (trace.chain, trace.extended))
@@ -91,14 +91,14 @@ def test_the_share_is_what_comes_back_without_the_effect_alone(healthy: Observat
     assert found["drift"] > 0.8
 
 
-def test_of_one_effect_the_share_is_all_that_is_explained(healthy: Observation) -> None:
+def test_of_one_effect_the_share_is_all_that_is_explained(healthy: Record) -> None:
     trace = traced(healthy, "delay")
     (effect,) = effects(trace)
     fallen = 1.0 - (trace.rms(trace.extended) / trace.rms(trace.chain)) ** 2
     assert effect.explained_fraction == pytest.approx(fallen, rel=1e-9)
 
 
-def test_the_evidence_is_each_effect_s_own(healthy: Observation) -> None:
+def test_the_evidence_is_each_effect_s_own(healthy: Record) -> None:
     drift, delay = effects(traced(healthy, "drift", "delay"))
     (alone,) = effects(traced(healthy, "delay"))
     assert drift.evidence.rms_without > 2.0 * delay.evidence.rms_without
@@ -110,7 +110,7 @@ def test_the_evidence_is_each_effect_s_own(healthy: Observation) -> None:
     assert delay.evidence.rms_without == pytest.approx(alone.evidence.rms_without, rel=1e-3)
 
 
-def test_what_else_was_tried_has_its_probability(healthy: Observation) -> None:
+def test_what_else_was_tried_has_its_probability(healthy: Record) -> None:
     trace = traced(healthy, "delay", others=("input_lag",))
     lag, none = alternatives(trace)
     assert (lag.name, lag.why_not, lag.selected) == ("input_lag", WhyNot.CREDIBLE, ("delay",))
@@ -121,11 +121,11 @@ def test_what_else_was_tried_has_its_probability(healthy: Observation) -> None:
     assert "credible set of delay" in why_not_text(lag)
 
 
-def test_one_effect_that_explains_all_is_found(healthy: Observation) -> None:
+def test_one_effect_that_explains_all_is_found(healthy: Record) -> None:
     assert traced(healthy, "delay").verdict == FOUND
 
 
-def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation) -> None:
+def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Record) -> None:
     trace = traced(healthy, "delay")
     (delay,) = candidate("delay").form.parameters
     rows = np.array([[delay.upper]])
@@ -136,14 +136,14 @@ def test_a_value_at_the_edge_of_its_range_is_no_measurement(healthy: Observation
         assert any("Its delay is at the edge" in each for each in evidence_text(effect)) is said
 
 
-def test_no_sentence_has_a_power_of_ten(healthy: Observation) -> None:
+def test_no_sentence_has_a_power_of_ten(healthy: Record) -> None:
     said = " ".join(s for e in effects(traced(healthy, "drift", "delay")) for s in evidence_text(e))
     assert "e+" not in said
 
 
 @pytest.mark.parametrize(("none", "verdict"), [(0.1, SUFFICIENT), (-1.5, AMBIGUOUS), (-6.0, FOUND)])
 def test_the_model_is_sufficient_where_it_is_the_most_probable(
-    healthy: Observation, none: float, verdict: str
+    healthy: Record, none: float, verdict: str
 ) -> None:
     """An effect nearly as probable is not named; one far more probable is."""
     trace = traced(healthy, "drift")

@@ -19,9 +19,9 @@ from afm_scan_ros.core.diagnosis.experiments import (
     propose,
 )
 from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -185,7 +185,7 @@ def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded(
 ) -> None:
     """A gain is like a stiffness with hysteresis, and a delay is like a lag."""
     scan = session.scan("scan", ScanSpec(lines=6), default_model())
-    first = Observation("scan", scan.drive, scan.measured, scan.spec)
+    first = Record.of_traces("scan", scan.drive, scan.measured, scan.spec)
     doubt = diagnose(default_model(), [first])
     assert doubt.verdict == AMBIGUOUS
     assert doubt.proposal is not None

@@ -8,9 +8,10 @@ from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import DEPOLARISED, InitialState, Observation, Playback
+from afm_scan_ros.core.diagnosis.records import DEPOLARISED, InitialState, Playback
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import InverseSettings
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import desired, total_samples
@@ -30,7 +31,7 @@ def drive_of(spec: ScanSpec) -> Trace:
     return inverse.whole(desired(spec, 0, total_samples(spec)))
 
 
-def last_of(*specs: ScanSpec) -> Observation:
+def last_of(*specs: ScanSpec) -> Record:
     """The last of several scans, one after the other on the same scanner."""
     scanner = Piezoscanner(default_plant(), SCAN.sample_period, SEED)
     first = 0
@@ -38,7 +39,7 @@ def last_of(*specs: ScanSpec) -> Observation:
         drive = drive_of(spec)
         measured, _ = scanner.advance(evolve(drive, first_sample=first))
         first += len(drive.x)
-    return Observation("scan", drive, evolve(measured, first_sample=0), specs[-1])
+    return Record.of_traces("scan", drive, evolve(measured, first_sample=0), specs[-1])
 
 
 def largest(evidence: Evidence, initial_state: InitialState) -> float:
@@ -61,14 +62,14 @@ def test_an_initial_state_that_is_ignored_costs_a_micrometre() -> None:
     assert initial_state.turns[-1] == pytest.approx(lowest, abs=0.1)
 
 
-def saturated(limit: float) -> Observation:
+def saturated(limit: float) -> Record:
     """A scan on a scanner that went to a limit and came back, before it was recorded."""
     path = np.interp(np.linspace(0.0, 3.0, 40_000), [0.0, 1.0, 2.0, 3.0], [0.0, limit, 0.0, 0.0])
     scanner = Piezoscanner(default_plant(), SCAN.sample_period, SEED)
     scanner.advance(Trace(0, SCAN.sample_period, path, path))
     drive = drive_of(UNPREPARED)
     measured, _ = scanner.advance(evolve(drive, first_sample=len(path)))
-    return Observation("scan", drive, evolve(measured, first_sample=0), UNPREPARED)
+    return Record.of_traces("scan", drive, evolve(measured, first_sample=0), UNPREPARED)
 
 
 @pytest.mark.parametrize(("limit", "end"), [(-4.0, 0), (4.0, 1)])

@@ -19,8 +19,9 @@ from afm_scan_ros.core.diagnosis.likelihood import (
     log_density,
 )
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation, Playback
+from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from helpers.in_process import ALL, default_model, scan
@@ -95,7 +96,7 @@ def test_an_error_of_untested_motion_may_be_far_larger(evidence: Evidence) -> No
 def evidence() -> Evidence:
     done = scan(SPEC, ALL)
     moved = evolve(done.measured, x=done.measured.x + 0.1 * done.true.x)
-    return evidence_of("x", default_model(), Observation("scan", done.drive, moved, SPEC))
+    return evidence_of("x", default_model(), Record.of_traces("scan", done.drive, moved, SPEC))
 
 
 def test_an_effect_s_formula_need_not_be_exact(evidence: Evidence) -> None:

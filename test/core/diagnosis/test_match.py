@@ -5,12 +5,12 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import Trace
@@ -30,8 +30,8 @@ def times(trace: Trace, factor: float) -> Trace:
     return evolve(trace, x=factor * trace.x, y=factor * trace.y)
 
 
-def observed(drive: Trace, moved: Trace) -> Observation:
-    return Observation("a scan", drive, moved, SPEC)
+def observed(drive: Trace, moved: Trace) -> Record:
+    return Record.of_traces("a scan", drive, moved, SPEC)
 
 
 def weaker(axis: AxisModel, factor: float) -> AxisModel:
@@ -86,7 +86,7 @@ def test_a_resonance_that_moved_makes_no_other_scanner() -> None:
     measured = predict(moved, drive)
     gain = float(predict(base, drive).x @ measured.x) / float(measured.x @ measured.x)
     assert gain < 0.5  # or the test shows nothing
-    refuse_mismatch(base, Observation("a chirp", drive, measured))
+    refuse_mismatch(base, Record.of_traces("a chirp", drive, measured))
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5])
@@ -98,7 +98,7 @@ def test_a_slew_limit_makes_no_other_scanner(share: float) -> None:
     drive = Trace(0, 5e-5, 3.0 * cycle, 3.0 * cycle)
     limited = evolve(drive, x=share * np.roll(3.0 * cycle, 150))
     measured = predict(default_model(), limited)
-    refuse_mismatch(default_model(), Observation("a scan", drive, measured))
+    refuse_mismatch(default_model(), Record.of_traces("a scan", drive, measured))
 
 
 def test_another_axis_is_refused_at_any_delay(healthy: Scan) -> None:

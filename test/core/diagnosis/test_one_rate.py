@@ -8,8 +8,8 @@ from scipy.signal import sawtooth
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.cautions import SingleRate, UntestedMotion, single_rate_band
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.diagnosis_json import diagnosis_document
@@ -51,7 +51,7 @@ def test_what_is_not_known_is_of_no_rate() -> None:
 def traced(x: AxisModel) -> ScannerDiagnosis:
     done = scan(SPEC, ALL)
     return diagnose(
-        evolve(default_model(), x=x), [Observation("scan", done.drive, done.measured, SPEC)]
+        evolve(default_model(), x=x), [Record.of_traces("scan", done.drive, done.measured, SPEC)]
     )
 
 

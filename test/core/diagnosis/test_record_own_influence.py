@@ -5,8 +5,8 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from helpers.in_process import ALL, default_model, scan
@@ -23,7 +23,7 @@ def test_a_step_beside_what_is_known_is_the_step_that_knows_nothing() -> None:
         turned = 2.0 * np.pi * frequency * time
         hum = cosine * np.cos(turned) + sine * np.sin(turned)
         measured = evolve(done.measured, x=np.roll(done.measured.x, 1) + hum)
-        observed = Observation("record", done.drive, measured, SPEC)
+        observed = Record.of_traces("record", done.drive, measured, SPEC)
         evidence.append(evidence_of("x", model, observed, number))
     tone, delay = effect_type("periodic_disturbance").form(""), effect_type("delay").form("")
     own = Problem(evidence, chain, [tone]).influence_of_selected(KEPT)

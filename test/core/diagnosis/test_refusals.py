@@ -8,9 +8,9 @@ from attrs import evolve
 from scipy.signal import sawtooth
 
 from afm_scan_ros.core.diagnosis.cautions import refuse_mismatch, single_rate_band
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array, Trace
 from helpers.in_process import default_model
@@ -40,7 +40,7 @@ def predicted(drive: Trace = DRIVE, model: ScannerModel = ALONE) -> Array:
 
 def check(measured: Array, drive: Trace = DRIVE, model: ScannerModel = ALONE) -> None:
     seen = Trace(0, PERIOD, measured, 0.0 * measured)
-    refuse_mismatch(model, Observation("record", drive, seen, axes=("x",)))
+    refuse_mismatch(model, Record.of_traces("record", drive, seen, axes=("x",)))
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND, SUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.model import Added, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from helpers.in_process import ALL, default_model, scan
@@ -30,25 +30,24 @@ CASES = [
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Observation:
+def healthy() -> Record:
     done = scan(SPEC, ALL)
-    return Observation("scan", done.drive, done.measured, SPEC, axes=("x",))
+    return Record.of_traces("scan", done.drive, done.measured, SPEC, axes=("x",))
 
 
-def diagnosed(name: str, healthy: Observation, scale: Scale) -> ScannerDiagnosis:
+def diagnosed(name: str, healthy: Record, scale: Scale) -> ScannerDiagnosis:
     model, effect = ScannerModel(x=default_model().x), EFFECTS[name]
     with_it = evolve(model, x=evolve(model.x, added=(effect,) if effect else ()))
-    moved = predict(with_it, healthy.drive).x - predict(model, healthy.drive).x
-    record = evolve(
-        healthy, displacement=evolve(healthy.displacement, x=healthy.displacement.x + moved)
-    )
+    drive, _ = healthy.traces()
+    moved = predict(with_it, drive).x - predict(model, drive).x
+    record = evolve(healthy, displacement=healthy.displacement[:, 0] + moved)
     return diagnose(ScannerModel(x=scaled_axis(model.x, scale)), [scaled_record(record, scale)])
 
 
 @pytest.mark.evidence
 @pytest.mark.parametrize(("name", "scale"), CASES)
 def test_verdict_and_probabilities_are_those_of_the_reference(
-    name: str, scale: Scale, healthy: Observation
+    name: str, scale: Scale, healthy: Record
 ) -> None:
     before, found = (diagnosed(name, healthy, each) for each in (Scale(), scale))
     assert before.verdict == (FOUND if name else SUFFICIENT)

@@ -7,8 +7,8 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -21,26 +21,26 @@ Error = Callable[[Array, Array], Array]
 
 
 @pytest.fixture(scope="module")
-def healthy() -> Observation:
+def healthy() -> Record:
     done = scan(SPEC, ALL)
-    return Observation("scan", done.drive, done.measured, SPEC)
+    return Record.of_traces("scan", done.drive, done.measured, SPEC)
 
 
-def suggested(healthy: Observation, error: Error) -> Suggestion | None:
+def suggested(healthy: Record, error: Error) -> Suggestion | None:
     """Suggestion for x, of which the sensor shows something in addition."""
     moved = healthy.displacement
-    wrong = evolve(moved, x=moved.x + error(moved.x, moved.y))
+    wrong = moved + np.outer(error(*moved.T), [1.0, 0.0])
     evidence = evidence_of("x", default_model(), evolve(healthy, displacement=wrong))
     return suggest("x", (evidence,), chain_of(default_model().x))
 
 
-def found(healthy: Observation, error: Error) -> Suggestion:
+def found(healthy: Record, error: Error) -> Suggestion:
     suggestion = suggested(healthy, error)
     assert suggestion is not None
     return suggestion
 
 
-def test_gain_that_depends_on_the_other_axis_is_a_product(healthy: Observation) -> None:
+def test_gain_that_depends_on_the_other_axis_is_a_product(healthy: Record) -> None:
     suggestion = found(healthy, lambda x, y: 1e-3 * (x / MICRO) * (y / MICRO) * MICRO)
     assert suggestion.symbols == ("x y",)
     assert suggestion.coefficients == (pytest.approx(1.0, rel=0.02),)
@@ -49,7 +49,7 @@ def test_gain_that_depends_on_the_other_axis_is_a_product(healthy: Observation) 
 
 
 @pytest.mark.parametrize("length", [0.7, 2.5])
-def test_cyclic_error_is_a_wave_of_position(healthy: Observation, length: float) -> None:
+def test_cyclic_error_is_a_wave_of_position(healthy: Record, length: float) -> None:
     suggestion = found(
         healthy, lambda x, _: 60.0 * NANO * np.sin(2.0 * np.pi * x / (length * MICRO) + 0.5)
     )
@@ -59,16 +59,16 @@ def test_cyclic_error_is_a_wave_of_position(healthy: Observation, length: float)
     assert np.hypot(*suggestion.coefficients[:2]) == pytest.approx(60.0, rel=0.1)
 
 
-def test_the_simplest_of_what_does_as_well_is_taken(healthy: Observation) -> None:
+def test_the_simplest_of_what_does_as_well_is_taken(healthy: Record) -> None:
     suggestion = found(healthy, lambda _, y: 5e-3 * y)
     assert suggestion.symbols == ("y",)
     assert suggestion.coefficients == (pytest.approx(5.0, rel=0.05),)
 
 
-def test_nothing_is_suggested_of_a_residual_at_its_floor(healthy: Observation) -> None:
+def test_nothing_is_suggested_of_a_residual_at_its_floor(healthy: Record) -> None:
     assert suggested(healthy, lambda x, _: np.zeros_like(x)) is None
 
 
-def test_nothing_is_suggested_of_noise(healthy: Observation) -> None:
-    noise = np.random.default_rng(5).normal(0.0, 50.0 * NANO, len(healthy.drive.x))
+def test_nothing_is_suggested_of_noise(healthy: Record) -> None:
+    noise = np.random.default_rng(5).normal(0.0, 50.0 * NANO, len(healthy.drive))
     assert suggested(healthy, lambda _, y: noise + 0.0 * y) is None

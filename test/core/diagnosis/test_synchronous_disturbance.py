@@ -9,8 +9,9 @@ from attrs import evolve
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, repeats
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.diagnosis.records import AxisSignals, Observation
+from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Trace
 from helpers.in_process import ALL, default_model, scan
@@ -39,24 +40,24 @@ def with_tone(moved: Trace, frequency: float, size: float = 3e-7) -> Trace:
     return evolve(moved, x=moved.x + size * np.sin(2.0 * np.pi * frequency * time))
 
 
-def scanned(healthy: Scan, frequency: float) -> Observation:
-    return Observation("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
+def scanned(healthy: Scan, frequency: float) -> Record:
+    return Record.of_traces("scan", healthy.drive, with_tone(healthy.measured, frequency), SPEC)
 
 
 def test_harmonics_of_a_synchronous_disturbance_are_synchronous(healthy: Scan) -> None:
     """At a multiple of the line rate hum, as one effect or a tone each, is no more certain."""
     hum = with_tone(with_tone(healthy.measured, IN_STEP), 2.0 * IN_STEP)
-    assert traced(Observation("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
+    assert traced(Record.of_traces("scan", healthy.drive, hum, SPEC)).verdict == AMBIGUOUS
 
 
-def rested(frequency: float, size: float, period: float = 1e-4) -> Observation:
+def rested(frequency: float, size: float, period: float = 1e-4) -> Record:
     """Of a scanner that its drive leaves alone."""
     noise = np.random.default_rng(2).normal(0.0, 2e-9, (2, STILL))
     still, moved = Trace(0, period, *np.zeros((2, STILL))), Trace(0, period, *noise)
-    return Observation("rest", still, with_tone(moved, frequency, size), experiment="rest")
+    return Record.of_traces("rest", still, with_tone(moved, frequency, size), kind="rest")
 
 
-def traced(*records: Observation) -> ScannerDiagnosis:
+def traced(*records: Record) -> ScannerDiagnosis:
     found = diagnose(default_model(), records)
     assert {effect.name for effect in found.effects} == {"periodic_disturbance"}
     return found

@@ -13,9 +13,9 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
 from afm_scan_ros.core.diagnosis.likelihood import BandFit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Scan
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
@@ -34,7 +34,7 @@ def healthy() -> Scan:
 
 def with_added(done: Scan, added: Array, number: int = 0) -> Evidence:
     measured = evolve(done.measured, x=done.measured.x + added)
-    observed = Observation("scan", done.drive, measured, SPEC)
+    observed = Record.of_traces("scan", done.drive, measured, SPEC)
     return evidence_of("x", default_model(), observed, number)
 
 

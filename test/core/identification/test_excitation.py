@@ -13,7 +13,8 @@ from afm_scan_ros.core.identification.drives.excitation import (
     excitation_block,
     hysteresis_plan,
 )
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord
+from afm_scan_ros.core.identification.records.recording import checked
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Trace
 from helpers.in_process import default_plant, drive_through
 
@@ -58,7 +59,7 @@ def test_a_record_of_the_other_axis_is_named(name: str) -> None:
     drive, displacement = drive_through(PLANS[name](), default_plant(), seed=1)
     with_form = Trace(0, displacement.sample_period, displacement.y, displacement.x)
     with pytest.raises(InputError, match="displacement x follows drive y"):
-        CalibrationRecord(name, drive, with_form)
+        checked(Record.of_traces(name, drive, with_form))
 
 
 def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:

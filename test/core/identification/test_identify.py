@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from afm_scan_ros.core.identification.alternating import REFERENCE_GAIN
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.identify import (
-    GivenRecord,
     Identification,
     identify_records,
 )
@@ -26,7 +26,7 @@ PLANT = load_plant(CONFIG / "plant.yaml")
 @pytest.fixture(scope="module")
 def found() -> Identification:
     made = {kind: record(plan(), PLANT, seed=1) for kind, plan in PLANS.items()}
-    return identify_records([GivenRecord(each, kind) for kind, each in made.items()])
+    return identify_records([evolve(each, kind=kind) for kind, each in made.items()])
 
 
 def test_the_model_identified_tracks_no_worse_than_the_default_one(found: Identification) -> None:

@@ -8,7 +8,8 @@ import pytest
 from attrs import frozen
 from scipy.signal import chirp, cont2discrete, lfilter, max_len_seq
 
-from afm_scan_ros.core.identification.records.recording import CalibrationRecord, problems
+from afm_scan_ros.core.identification.records.recording import checked, problems
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, Trace
 
 DATA = Path(os.environ.get("AFM_SCAN_DATA", Path(__file__).parents[4] / "shared/data"))
@@ -121,7 +122,7 @@ def of_x(values: Array, period: float) -> Trace:
 @pytest.mark.parametrize("case", CASES)
 def test_a_good_record_is_none_the_worse_for_its_lab(case: str) -> None:
     period, drive, stage = CASES[case]
-    found = problems(of_x(drive, period), of_x(stage.moved(drive, period), period), ("x",))
+    found = problems(Record(drive, stage.moved(drive, period), period))
     assert list(found) == []
 
 
@@ -129,7 +130,7 @@ def test_samples_lost_between_multisines_are_found_all_the_same() -> None:
     drive = waves(1000.0)
     moved = Stage().moved(drive, PERIOD)
     lost = np.concatenate([moved[:7000], moved[7030:], moved[-30:]])
-    message = list(problems(of_x(drive, PERIOD), of_x(lost, PERIOD), ("x",)))
+    message = list(problems(Record(drive, lost, PERIOD)))
     assert any("jumps, as if samples were lost" in each for each in message), message
     assert any("at sample 7000" in each for each in message), message
 
@@ -139,18 +140,17 @@ def test_a_recording_of_a_micromanipulator_is_none_the_worse() -> None:
     if not path.exists():
         pytest.skip(f"measured data are not in {DATA}: set AFM_SCAN_DATA")
     table = np.loadtxt(path)
-    drive, moved = (of_x(s, 5e-3) for s in (table[:, 0], 1e-6 * table[:, 4]))
-    assert list(problems(drive, moved, ("x",))) == []
+    assert list(problems(Record(table[:, 0], 1e-6 * table[:, 4], 5e-3))) == []
 
 
 def test_an_axis_that_is_not_driven_is_left_out() -> None:
     drive = of_x(GROWING, PERIOD)
     moved = Trace(0, PERIOD, Stage().moved(GROWING, PERIOD), 1e-8 * np.sin(TIME))
-    assert CalibrationRecord("loops", drive, moved).axes == ("x",)
+    assert checked(Record.of_traces("loops", drive, moved)).axes == ("x",)
 
 
 def test_the_zero_is_where_the_record_rests() -> None:
     drive = np.concatenate([np.zeros(500), GROWING])
     moved = Stage(offset=-96e-6).moved(drive, PERIOD)
-    record = CalibrationRecord("loops", of_x(drive, PERIOD), of_x(moved, PERIOD), ("x",))
-    np.testing.assert_allclose(record.displacement.x, moved - moved[:501].mean(), atol=1e-12)
+    record = checked(Record(drive, moved, PERIOD))
+    np.testing.assert_allclose(record.displacement[:, 0], moved - moved[:501].mean(), atol=1e-12)

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.spectra import (
-    CoupledRecord,
     in_periods,
     period_of_drive,
 )
+from afm_scan_ros.core.record import Record
 
 LENGTH, LINES = 200, 60
 
@@ -23,13 +23,11 @@ def multisine(seed: int, length: int = LENGTH) -> np.ndarray:
     return np.fft.irfft(spectrum, length, axis=0)
 
 
-def record(
-    seed: int = 0, periods: int = 3, length: int = LENGTH, noise: float = 0.0
-) -> CoupledRecord:
+def record(seed: int = 0, periods: int = 3, length: int = LENGTH, noise: float = 0.0) -> Record:
     one = multisine(seed, length)
     drive = np.tile(one, (periods, 1))
     drive += noise * one.std() * np.random.default_rng(seed).standard_normal(drive.shape)
-    return CoupledRecord(f"record {seed}", drive, 1e-6 * drive, 0.01)
+    return Record(drive, 1e-6 * drive, 0.01, ("x", "y"), name=f"record {seed}")
 
 
 @given(
@@ -64,7 +62,7 @@ def test_what_is_kept_is_the_last_whole_periods() -> None:
 def test_a_drive_that_does_not_repeat_is_refused() -> None:
     noise = np.random.default_rng(0).standard_normal((600, 2))
     with pytest.raises(InputError, match="noise: its drive does not repeat within its 600 samples"):
-        in_periods([CoupledRecord("noise", noise, noise, 0.01)])
+        in_periods([Record(noise, noise, 0.01, ("x", "y"), name="noise")])
 
 
 def test_a_transient_is_refused() -> None:
@@ -85,6 +83,6 @@ def test_a_transient_is_refused() -> None:
         (evolve(record(1), drive=record(1).drive[:, :1]), "record 1: inputs: 1, and 2 in record 0"),
     ],
 )
-def test_records_that_are_unlike_are_refused(other: CoupledRecord, says: str) -> None:
+def test_records_that_are_unlike_are_refused(other: Record, says: str) -> None:
     with pytest.raises(InputError, match=says):
         in_periods([record(0), other])

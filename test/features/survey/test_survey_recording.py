@@ -9,8 +9,8 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_gain, insert_resonance
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Trace
@@ -29,7 +29,9 @@ def changed(chain: Chain, factors: dict[str, float]) -> Chain:
 @cache
 def evidence(spec: ScanSpec) -> Evidence:
     made = scan(spec, ALL)
-    return evidence_of("x", default_model(), Observation("scan", made.drive, made.measured, spec))
+    return evidence_of(
+        "x", default_model(), Record.of_traces("scan", made.drive, made.measured, spec)
+    )
 
 
 def told(
@@ -43,7 +45,7 @@ def told(
     moved = moved + size * np.random.default_rng(seed).standard_normal(len(moved))
     still, period = np.zeros_like(moved), before.playback.view.sample_period
     drive = Trace(0, period, before.playback.view.drive, still)
-    observed = Observation("made", drive, Trace(0, period, moved, still), spec)
+    observed = Record.of_traces("made", drive, Trace(0, period, moved, still), spec)
     found = evidence_of("x", default_model(), observed)
     return {each.name: each for each in estimates(found, chain)}
 

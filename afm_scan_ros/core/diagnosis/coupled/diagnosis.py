@@ -29,7 +29,7 @@ from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import changes_linearly, coupled_form
 from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
-from afm_scan_ros.core.identification.state_space.spectra import CoupledRecord
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 ALL = "all"
@@ -137,8 +137,8 @@ def _chosen(parameter: EffectParameter, value: float) -> Value:
 
 def diagnose_coupled(
     scanner: CoupledScanner,
-    records: Sequence[CoupledRecord],
-    healthy: Sequence[CoupledRecord],
+    records: Sequence[Record],
+    healthy: Sequence[Record],
     progress: ProgressCallback,
 ) -> CoupledDiagnosis:
     """Find the effects that a model of coupled axes lacks, and identify it anew with them.

@@ -27,11 +27,11 @@ from afm_scan_ros.core.identification.state_space.identify import (
 )
 from afm_scan_ros.core.identification.state_space.spectra import (
     DRIVEN,
-    CoupledRecord,
     Periods,
     in_periods,
     power_by_band,
 )
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
 Levels = list[list[int]]
@@ -67,7 +67,7 @@ class DiagnosedRecords:
 
 
 def diagnosed_records(
-    scanner: CoupledScanner, records: Sequence[CoupledRecord], healthy: Sequence[CoupledRecord]
+    scanner: CoupledScanner, records: Sequence[Record], healthy: Sequence[Record]
 ) -> DiagnosedRecords:
     """Cut records into periods, and group them by amplitude.
 
@@ -85,7 +85,7 @@ def diagnosed_records(
     return DiagnosedRecords(in_periods([*known, *records]), groups[0], later, bool(healthy))
 
 
-def _own_word(scanner: CoupledScanner, records: Sequence[CoupledRecord]) -> list[CoupledRecord]:
+def _own_word(scanner: CoupledScanner, records: Sequence[Record]) -> list[Record]:
     """What the model says at each amplitude of its own, of the first drives made as small."""
     periods, first = in_periods(records), levels_of(records)[0]
     drives = periods.drive[:, :, first].mean(axis=3)
@@ -96,11 +96,13 @@ def _own_word(scanner: CoupledScanner, records: Sequence[CoupledRecord]) -> list
         moved = scanner.model.steady_state(smaller)
         for drive, output in zip(*(np.moveaxis(s, 2, 0) for s in (smaller, moved)), strict=True):
             driven, followed = (np.tile(signal, (2, 1)) for signal in (drive, output))
-            found.append(CoupledRecord("the model", driven, followed, scanner.sample_period))
+            found.append(
+                Record(driven, followed, scanner.sample_period, scanner.axes, name="the model")
+            )
     return found
 
 
-def _refuse_other(scanner: CoupledScanner, record: CoupledRecord) -> None:
+def _refuse_other(scanner: CoupledScanner, record: Record) -> None:
     period = scanner.sample_period
     if not np.isclose(record.sample_period, period, rtol=1e-9, atol=0.0):
         raise InputError(
@@ -109,7 +111,7 @@ def _refuse_other(scanner: CoupledScanner, record: CoupledRecord) -> None:
         )
 
 
-def _refuse_twice(records: Sequence[CoupledRecord]) -> None:
+def _refuse_twice(records: Sequence[Record]) -> None:
     for place, record in enumerate(records):
         for other in records[:place]:
             if np.array_equal(record.displacement, other.displacement):

@@ -30,16 +30,17 @@ from afm_scan_ros.core.identification.state_space.feedback import (
 from afm_scan_ros.core.identification.state_space.fit import COARSE_LINES, fit_state_space, refined
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel, modes
 from afm_scan_ros.core.identification.state_space.spectra import (
-    CoupledRecord,
     PeriodicRecords,
     Periods,
     Spectra,
+    drive_rms,
     in_periods,
     joined,
     periodic_records,
     power_by_band,
     reliability,
 )
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback, floats
 
 GROWTH = 1.25
@@ -120,7 +121,7 @@ class CoupledSetting:
 
 
 def identify_coupled(
-    records: Sequence[CoupledRecord],
+    records: Sequence[Record],
     axes: tuple[str, ...],
     setting: CoupledSetting,
     progress: ProgressCallback,
@@ -235,24 +236,25 @@ def _of_level(periods: Periods, level: list[int]) -> PeriodicRecords:
     )
 
 
-def levels_of(records: Sequence[CoupledRecord]) -> list[list[int]]:
+def levels_of(records: Sequence[Record]) -> list[list[int]]:
     """Records by their drive's rms, from the least; in each level in the order given."""
-    order = sorted(range(len(records)), key=lambda k: records[k].rms)
+    order = sorted(range(len(records)), key=lambda k: drive_rms(records[k]))
     levels = [[order[0]]]
     for before, k in pairwise(order):
-        if records[k].rms > LEVEL_STEP * records[before].rms:
+        if drive_rms(records[k]) > LEVEL_STEP * drive_rms(records[before]):
             levels.append([])
         levels[-1].append(k)
     return [sorted(level) for level in levels]
 
 
-def refuse_few(records: Sequence[CoupledRecord], levels: list[list[int]], inputs: int) -> None:
+def refuse_few(records: Sequence[Record], levels: list[list[int]], inputs: int) -> None:
     """Raise InputError for a level that has no more records than there are inputs."""
     for level in levels:
         if len(level) <= inputs:
             names = ", ".join(records[k].name for k in level)
             raise InputError(
-                f"{names}: {len(level)} realisations with {records[level[0]].rms:.3g} V rms, of"
+                f"{names}: {len(level)} realisations with"
+                f" {drive_rms(records[level[0]]):.3g} V rms, of"
                 f" {inputs} inputs: record {inputs + 1} or more at each amplitude"
             )
 
@@ -292,7 +294,7 @@ CHANCE = 1e-3
 """Probability that an axis without coupling passes for a coupled one."""
 
 
-def coupling_is_seen(records: Sequence[CoupledRecord]) -> bool:
+def coupling_is_seen(records: Sequence[Record]) -> bool:
     """Whether an axis follows all drives better than its own alone, by an F test.
 
     False where the records cannot tell: they are no multisines in steady state, or of fewer

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.model import Complex
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
 REPEATS = 0.01
@@ -31,19 +32,9 @@ BEGINNING = 10
 """Part of a period, one in so many, that is its beginning."""
 
 
-@frozen(eq=False)
-class CoupledRecord:
-    """A drive (n, m) in V and the displacement (n, p) in m; ``name`` is for messages."""
-
-    name: str
-    drive: Array
-    displacement: Array
-    sample_period: float
-
-    @property
-    def rms(self) -> float:
-        """Rms drive, of all inputs together, V."""
-        return float(np.sqrt(np.mean(self.drive**2)))
+def drive_rms(record: Record) -> float:
+    """Return the rms drive of a record, of all inputs together, V."""
+    return float(np.sqrt(np.mean(record.drive**2)))
 
 
 @frozen(eq=False)
@@ -59,7 +50,7 @@ class Periods:
     used: NDArray[np.bool_]
 
 
-def in_periods(records: Sequence[CoupledRecord]) -> Periods:
+def in_periods(records: Sequence[Record]) -> Periods:
     """Cut records into periods; each begins in steady state.
 
     Raises InputError where a record's drive does not repeat, its displacement has not settled, or
@@ -81,7 +72,7 @@ def in_periods(records: Sequence[CoupledRecord]) -> Periods:
     return Periods(drive, output, first.sample_period, power > DRIVEN * power.max())
 
 
-def period_of_drive(record: CoupledRecord) -> int:
+def period_of_drive(record: Record) -> int:
     """Return the samples after which a drive repeats; raises InputError where it does not."""
     samples = len(record.drive)
     share = _differing(record.drive)
@@ -115,7 +106,7 @@ def _cut(signal: Array, length: int, periods: int) -> Array:
     return np.moveaxis(last.reshape(periods, length, -1), 0, 2)
 
 
-def _refuse_unlike(first: CoupledRecord, length: int, other: CoupledRecord) -> None:
+def _refuse_unlike(first: Record, length: int, other: Record) -> None:
     said = (
         ("sample period (s)", first.sample_period, other.sample_period),
         ("inputs", first.drive.shape[1], other.drive.shape[1]),
@@ -130,7 +121,7 @@ def _refuse_unlike(first: CoupledRecord, length: int, other: CoupledRecord) -> N
             )
 
 
-def _refuse_unsettled(record: CoupledRecord, length: int) -> None:
+def _refuse_unsettled(record: Record, length: int) -> None:
     """Raise InputError where the first period shows a transient that the last does not."""
     each = _cut(record.displacement, length, len(record.drive) // length)
     power = np.sum((each[:, :, 0] - each[:, :, -1]) ** 2, axis=1)

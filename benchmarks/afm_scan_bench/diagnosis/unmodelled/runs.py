@@ -17,7 +17,7 @@ from afm_scan_bench.session import InProcessSession
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.closed_loop import FIRST, diagnose_until_resolved
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
-from afm_scan_ros.core.diagnosis.records import Observation
+from afm_scan_ros.core.record import Record
 
 PROCESSES = 2
 
@@ -46,8 +46,8 @@ def run(case: UnmodelledCase) -> UnmodelledOutcome:
     where = InProcessSession(evolve(healthy, mechanisms=case.mechanisms), case.seed)
     done = where.scan(FIRST, case.spec, model)
     began = time.perf_counter()
-    record = Observation(FIRST, done.drive, done.measured, case.spec)
-    experiments = dict[str, Observation]()
+    record = Record.of_traces(FIRST, done.drive, done.measured, case.spec)
+    experiments = dict[str, Record]()
     found = list(diagnose_until_resolved(where, model, [record], experiments, diagnose))
     seconds = time.perf_counter() - began
     statements = tuple(map(Statement.by, found))

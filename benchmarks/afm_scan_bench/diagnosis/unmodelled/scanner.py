@@ -11,7 +11,7 @@ from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import default_plant
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
-from afm_scan_ros.core.identification.identify import GivenRecord, identify_records
+from afm_scan_ros.core.identification.identify import identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel, band_edges
 from afm_scan_ros.core.scanner import predict
@@ -28,7 +28,7 @@ def healthy_scanner(seed: int, noise: float) -> tuple[PlantSpec, ScannerModel]:
     sensor = evolve(plant.sensor, noise_rms=noise * plant.sensor.noise_rms)
     plant = evolve(plant, sensor=sensor)
     records = calibrate_in_process(plant, seed)
-    given = [GivenRecord(record, kind) for kind, record in records.items()]
+    given = [evolve(record, kind=kind) for kind, record in records.items()]
     return plant, identify_records(given).model
 
 
