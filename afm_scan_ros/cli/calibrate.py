@@ -7,10 +7,15 @@ from typing import Any
 
 import click
 
-from afm_scan_ros.cli.driving import DrivenScanner, PlannedCalibration, run_calibration
+from afm_scan_ros.cli.driving import (
+    DrivenScanner,
+    PlannedCalibration,
+    driven_options,
+    run_calibration,
+)
 from afm_scan_ros.cli.options import FILE, FOLDER, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
-from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
+from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
@@ -91,7 +96,7 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @click.command(epilog=_purposes())
-@scanner_options
+@driven_options
 @click.option(
     "--out",
     type=FOLDER,
@@ -103,7 +108,6 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=FOLDER,
     help="Drive nothing: write the drives to this folder as CSV and npz, for a lab's converter.",
 )
-@seed_option
 @click.option(
     "--model",
     type=FILE,
@@ -120,20 +124,16 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=positive("m"),
     help="Largest peak of the resonance beyond the steady displacement.  [default: half the range]",
 )
-@time_scale_option
 @experiment_options
 def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    plant: Path,
-    scanner: str,
+    driven: DrivenScanner,
     out: Path | None,
     experiment: tuple[str | None, Size],
     folder: Path | None,
-    seed: int,
     model: Path | None,
     wanted: PlanOptions,
     travel: float | None,
     excitation: float | None,
-    time_scale: float | None,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
@@ -150,7 +150,6 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")
-    driven = DrivenScanner(scanner, plant, seed, time_scale)
     if name is None and (known or wanted.scan_range):
         limits = driven.limits
         scan_range = wanted.range_for(known)
@@ -163,10 +162,11 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         bags = [*wanted.have, *planned.run()]
         advice = f"afm-scan identify {' '.join(map(str, bags))} --out model.yaml"
     else:
-        plans = _default_drives(scanner, name, known, size, wanted.rate)
+        plans = _default_drives(driven.scanner, name, known, size, wanted.rate)
         run_calibration(driven, out, plans)
         advice = _next(out, name)
-    recorded = f"the simulated scanner of {plant}" if scanner == SIM else f"scanner {scanner}"
+    of = driven.scanner
+    recorded = f"the simulated scanner of {driven.plant}" if of == SIM else f"scanner {of}"
     click.echo(f"Recorded {recorded} in {out}.")
     click.echo(f"next: {advice}")
 

@@ -137,7 +137,7 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
 def _external() -> ScannerChoice:
     if lacking := lacking_ros():
         raise InputError(f"--scanner {EXTERNAL}: {lacking}; a scanner node needs ROS 2")
-    from afm_scan_ros.cli.external import found_scanner  # noqa: PLC0415 - needs ROS
+    from afm_scan_ros.cli.listening import found_scanner  # noqa: PLC0415 - needs ROS
 
     node, known = found_scanner(SCANNERS, _longest_wait())
     return ScannerChoice(node, knows_true=known, external=True)
@@ -160,7 +160,6 @@ def pace_of(scanner: str) -> float:
     return 0.0 if scanner == SIM else 1.0
 
 
-seed_option = click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 time_scale_option = click.option(
     "--time-scale",
     type=float,

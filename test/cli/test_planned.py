@@ -14,6 +14,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli import calibrate as command
+from afm_scan_ros.cli import driving
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
@@ -51,6 +52,14 @@ class InProcess:
         return self
 
     @property
+    def scanner(self) -> str:
+        return self.given.scanner
+
+    @property
+    def plant(self) -> Path:
+        return self.given.plant
+
+    @property
     def limits(self) -> DriveLimits | None:
         return self.given.limits
 
@@ -68,7 +77,7 @@ class InProcess:
 
 def calibrate(scanner: InProcess, *words: str) -> Result:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "DrivenScanner", scanner)
+        patch.setattr(driving, "DrivenScanner", scanner)
         return CliRunner().invoke(command.calibrate, words)
 
 

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import click
 
+from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import drive_limits_of
-from afm_scan_ros.cli.scanner import scanner_options, seed_option, time_scale_option
-from afm_scan_ros.cli.session import RecordedSession
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
@@ -46,7 +45,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@scanner_options
+@driven_options
 @click.option(
     "--scans",
     type=click.IntRange(min=FEWEST),
@@ -60,19 +59,8 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
-@seed_option
-@time_scale_option
-def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    spec: Path,
-    model: Path,
-    plant: Path,
-    scanner: str,
-    scans: int,
-    out: Path,
-    seed: int,
-    time_scale: float | None,
-    *,
-    diagnosed: bool,
+def learn(
+    spec: Path, model: Path, driven: DrivenScanner, scans: int, out: Path, *, diagnosed: bool
 ) -> None:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
@@ -83,9 +71,9 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     for axis in AXES:
         base.axis(axis)
     wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    limits = drive_limits_of(scanner, plant)
+    limits = drive_limits_of(driven.scanner, driven.plant)
     refuse_existing(out / "bags")
-    session = RecordedSession(plant, out, seed, scanner, time_scale)
+    session = RecordedSession(driven, out)
     done: list[LearningScan] = []
     failure, ended = "", None
     try:

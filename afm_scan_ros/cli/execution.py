@@ -1,10 +1,11 @@
-"""A scan or a record in this process, where there is no ROS."""
+"""Executes what is ordered: by nodes where there is ROS, in this process elsewhere."""
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import click
 from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
@@ -27,6 +28,7 @@ from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.nodes import has_rclpy, lacking_ros
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
 from afm_scan_ros.nodes.parameters import (
     ADAPTATION,
@@ -40,8 +42,37 @@ from afm_scan_ros.nodes.parameters import (
 from afm_scan_ros.pipeline import ScanChain, run
 
 
-def scan(order: ScanOrder) -> None:
+def execute_scan(order: ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
+    if nodes_can_run():
+        from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
+
+        by_nodes.scan(order)
+    else:
+        _scan(order)
+
+
+def execute_record(order: RecordOrder) -> None:
+    """Drive the scanner through a plan; raises as ``execute_scan`` does."""
+    if nodes_can_run():
+        from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
+
+        by_nodes.record(order)
+    else:
+        _record(order)
+
+
+@cache
+def nodes_can_run() -> bool:
+    """Return whether nodes can run; a ROS without this package's messages is told of once."""
+    lacking = lacking_ros()
+    if lacking and has_rclpy():
+        click.echo(f"afm-scan: {lacking}; all runs in this process instead", err=True)
+    return not lacking
+
+
+def _scan(order: ScanOrder) -> None:
+    """Scan in this process."""
     files, spec = order.files, order.spec
     flow = _flow({**order.flow, **order.scanner.source}, str(files.spec))
     own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
@@ -67,8 +98,8 @@ def scan(order: ScanOrder) -> None:
         run(chain, files.bag, shown)
 
 
-def record(order: RecordOrder) -> None:
-    """Drive the scanner through a plan; raises as ``scan`` does."""
+def _record(order: RecordOrder) -> None:
+    """Drive the scanner through a plan in this process."""
     plan, flow = order.plan, _flow(order.scanner.source, order.plan.name)
     info = ScanInfo(*identity(""), plan.name, plan.sample_period, plan.total_samples)
     chain = ScanChain(
