@@ -1,9 +1,6 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -13,7 +10,7 @@ from afm_scan_ros.cli.driving import (
     driven_options,
     run_calibration,
 )
-from afm_scan_ros.cli.options import FILE, FOLDER, positive
+from afm_scan_ros.cli.options import FILE, FOLDER, grouped, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
 from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
@@ -64,35 +61,32 @@ def _next(out: Path, experiment: str | None) -> str:
     return f"diagnose it together with the bags of the ambiguous diagnosis: {command}"
 
 
-def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add an experiment and its size to a command, which gets both as ``experiment``."""
+def _experiment(
+    experiment: str | None, amplitude: float | None, duration: float | None
+) -> tuple[str | None, Size]:
+    size = amplitude, duration
+    if experiment is None and size != OWN_SIZE:
+        raise click.UsageError("--amplitude and --duration size an --experiment: give it too")
+    return experiment, size
 
-    @click.option(
+
+experiment_options = grouped(
+    "experiment",
+    _experiment,
+    click.option(
         "--experiment", type=click.Choice(tuple(EXPERIMENTS)), help="Record only this experiment."
-    )
-    @click.option(
+    ),
+    click.option(
         "--amplitude",
         type=positive("V"),
         help="With --experiment: its largest voltage, from the middle of the drive.",
-    )
-    @click.option(
+    ),
+    click.option(
         "--duration",
         type=positive("s"),
         help="With --experiment: its length. All times change in proportion.",
-    )
-    @wraps(command)
-    def with_experiment(
-        experiment: str | None,
-        amplitude: float | None,
-        duration: float | None,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        size = amplitude, duration
-        if experiment is None and size != OWN_SIZE:
-            raise click.UsageError("--amplitude and --duration size an --experiment: give it too")
-        command(experiment=(experiment, size), **options)
-
-    return with_experiment
+    ),
+)
 
 
 @click.command(epilog=_purposes())

@@ -1,10 +1,8 @@
 """Drives the scanner of --scanner: through plans, also grown while watched, and through scans."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from functools import wraps
 from pathlib import Path
-from typing import Any
 
 import click
 from attrs import define, evolve, field, frozen
@@ -14,7 +12,7 @@ from afm_scan_ros.api.record import read_record
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import ScanInfo
 from afm_scan_ros.cli.execution import execute_record
-from afm_scan_ros.cli.options import refuse_existing
+from afm_scan_ros.cli.options import grouped, refuse_existing
 from afm_scan_ros.cli.orders import RecordOrder, ScanFiles, refuse_pace
 from afm_scan_ros.cli.plan import covered
 from afm_scan_ros.cli.processes import set_aside
@@ -105,23 +103,18 @@ class DrivenScanner:
         execute_record(RecordOrder(plan, bag, f"{title}, to {bag}", chosen, time_scale, self.own))
 
 
-def driven_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a scanner to a command, which gets it as ``driven``."""
+def _driven(scanner: str, plant: Path, seed: int, time_scale: float | None) -> DrivenScanner:
+    return DrivenScanner(scanner, plant, seed, time_scale)
 
-    @scanner_options
-    @click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
-    @time_scale_option
-    @wraps(command)
-    def with_driven(
-        scanner: str,
-        plant: Path,
-        seed: int,
-        time_scale: float | None,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        command(driven=DrivenScanner(scanner, plant, seed, time_scale), **options)
 
-    return with_driven
+driven_options = grouped(
+    "driven",
+    _driven,
+    scanner_options,
+    click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise."),
+    time_scale_option,
+)
+"""A scanner, which the command gets as ``driven``."""
 
 
 def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Waveform]]) -> None:

@@ -1,15 +1,13 @@
 """``afm-scan plan``: the records that would identify a scanner, or that are still lacking."""
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
-from attrs import fields, frozen
+from attrs import frozen
 
 from afm_scan_ros.api.record import read_record
-from afm_scan_ros.cli.options import FOLDER, positive, quantity
+from afm_scan_ros.cli.options import FOLDER, grouped, positive, quantity
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
@@ -106,37 +104,32 @@ class PlanOptions:
         return (-limit if lowest is None else lowest), limit
 
 
-def plan_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a plan to a command, which gets them as ``wanted``."""
-
-    @click.option(
+plan_options = grouped(
+    "wanted",
+    PlanOptions,
+    click.option(
         "--range",
         "scan_range",
         type=positive("m"),
         help="Largest scan. It limits the drives once a record shows the gain.",
-    )
-    @click.option("--limit", type=positive("V"), help="Highest drive voltage.")
-    @click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]")
-    @click.option("--rate", type=positive("Hz"), help="Samples a second of the converter.")
-    @click.option(
+    ),
+    click.option("--limit", type=positive("V"), help="Highest drive voltage."),
+    click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]"),
+    click.option("--rate", type=positive("Hz"), help="Samples a second of the converter."),
+    click.option(
         "--hold",
         type=positive("s"),
         default="5min",
         show_default=True,
         help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
-    )
-    @click.option(
+    ),
+    click.option(
         "--have",
         type=click.Path(exists=True, path_type=Path),
         multiple=True,
         help="Record at hand; give one or more. What it shows is not proposed again.",
-    )
-    @wraps(command)
-    def with_plan(**given: Any) -> None:  # noqa: ANN401 - the command's own
-        own = {each.name: given.pop(each.name) for each in fields(PlanOptions)}
-        command(wanted=PlanOptions(**own), **given)
-
-    return with_plan
+    ),
+)
 
 
 @click.command()
