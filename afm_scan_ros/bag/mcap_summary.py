@@ -17,6 +17,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from afm_scan_ros.bag.mcap_file import (
     CUT,
+    HEAD,
     Bounded,
     RawMessage,
     RepeatedLayout,
@@ -25,7 +26,6 @@ from afm_scan_ros.bag.mcap_file import (
     runs,
     unpacked,
 )
-from afm_scan_ros.bag.mcap_sizes import HEAD
 from afm_scan_ros.files.unfolding import refuse_unfolding
 
 LARGEST = 2**23
