@@ -34,12 +34,6 @@ Size = tuple[float | None, float | None]
 OWN_SIZE: Size = None, None
 
 
-def _purposes() -> str:
-    """Each experiment and what it is for, as click prints a list."""
-    lines = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
-    return "\n\n".join(("Experiments:", *lines))
-
-
 def _drive(kind: str, model: ScannerModel | None, size: Size, rate: float | None) -> Plan[Waveform]:
     """Drive of a kind, for the scanner of a model, if there is one."""
     if model is not None and kind in EXPERIMENTS:
@@ -89,7 +83,10 @@ experiment_options = grouped(
 )
 
 
-@click.command(epilog=_purposes())
+PURPOSES = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
+
+
+@click.command(epilog="\n\n".join(("Experiments:", *PURPOSES)))
 @driven_options
 @click.option(
     "--out",

@@ -103,13 +103,9 @@ class DrivenScanner:
         execute_record(RecordOrder(plan, bag, f"{title}, to {bag}", chosen, time_scale, self.own))
 
 
-def _driven(scanner: str, plant: Path, seed: int, time_scale: float | None) -> DrivenScanner:
-    return DrivenScanner(scanner, plant, seed, time_scale)
-
-
 driven_options = grouped(
     "driven",
-    _driven,
+    DrivenScanner,
     scanner_options,
     click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise."),
     time_scale_option,

@@ -139,7 +139,9 @@ def _external() -> ScannerChoice:
         raise InputError(f"--scanner {EXTERNAL}: {lacking}; a scanner node needs ROS 2")
     from afm_scan_ros.cli.listening import found_scanner  # noqa: PLC0415 - needs ROS
 
-    node, known = found_scanner(SCANNERS, _longest_wait())
+    context = click.get_current_context(silent=True)
+    wait = PATIENCE if context is None else float(context.meta.get(_WAIT, PATIENCE))
+    node, known = found_scanner(SCANNERS, wait)
     return ScannerChoice(node, knows_true=known, external=True)
 
 
@@ -197,17 +199,11 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
         if plant is not None and scanner != SIM:
             raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
-        _refuse_incomplete(scanner)
+        if lacking := [*_settings_lacking(scanner), *_model_lacking(scanner)]:
+            raise InputError(f"--scanner {scanner}: {'; '.join(lacking)}")
         command(scanner=scanner, plant=plant or PLANT, **options)
 
     return with_scanner
-
-
-def _refuse_incomplete(scanner: str) -> None:
-    """Raise InputError where a scanner lacks its settings, or its own model."""
-    lacking = [*_settings_lacking(scanner), *_model_lacking(scanner)]
-    if lacking:
-        raise InputError(f"--scanner {scanner}: {'; '.join(lacking)}")
 
 
 def _settings_lacking(scanner: str) -> Iterator[str]:
@@ -233,11 +229,6 @@ def _model_lacking(scanner: str) -> Iterator[str]:
 def _keep_wait(ctx: click.Context, _: click.Parameter, seconds: float | None) -> None:
     if seconds is not None:
         ctx.meta[_WAIT] = seconds
-
-
-def _longest_wait() -> float:
-    context = click.get_current_context(silent=True)
-    return PATIENCE if context is None else float(context.meta.get(_WAIT, PATIENCE))
 
 
 def driver_and_file(scanner: str) -> tuple[str, Path]:

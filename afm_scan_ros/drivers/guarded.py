@@ -102,6 +102,12 @@ class SensorWatch:
         self._high = np.where(self._same, np.fmax(self._high, mean), np.nan)
 
 
+def held_after(drive: Trace, late: int) -> Trace:
+    """Return a drive that is held at its end for so many samples."""
+    x, y = (np.pad(drive.axis(axis), (0, late), "edge") for axis in AXES)
+    return Trace(drive.first_sample, drive.sample_period, x, y)
+
+
 @frozen
 class Displacement:
     """Displacement (m): as measured, and without noise where the driver knows that."""
@@ -159,7 +165,7 @@ class GuardedDriver:
         """
         self._refuse(drive)
         self._before = {axis: float(drive.axis(axis)[-1]) for axis in AXES}
-        answer = self._answer(self._held_after(drive) if last else drive)
+        answer = self._answer(held_after(drive, self.latency_samples) if last else drive)
         read, true = self._dated(answer.sensor), self._dated(answer.true) if answer.true else None
         self._next_sample += read.x.size
         self._early -= answer.sensor.x.size - read.x.size
@@ -185,11 +191,6 @@ class GuardedDriver:
         answer = checked(self._driver.advance(drive), drive, knows_true=self.knows_true)
         self._watch.check(drive, answer.sensor)
         return answer
-
-    def _held_after(self, drive: Trace) -> Trace:
-        late = self.latency_samples
-        x, y = (np.pad(drive.axis(axis), (0, late), "edge") for axis in AXES)
-        return Trace(drive.first_sample, drive.sample_period, x, y)
 
     def _dated(self, late: Trace) -> Trace:
         """Return readings as of the samples of their displacement, without those before it."""

@@ -367,19 +367,16 @@ def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)
 
 
-def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
-    arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
-    return _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
-
-
 def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
-    behind, operator = model.output, model.forward
+    behind, of = model.output, model.forward
     given = None if behind is None else recast(_OutputMap, behind)
     forward = duhem = None
-    if isinstance(operator, EverettSurface):
-        forward = _surface_to(operator, f"{axis}_forward", arrays)
+    if isinstance(of, EverettSurface):
+        forward = _surface_to(of, f"{axis}_forward", arrays)
     else:
-        duhem = _slopes_to(operator, f"{axis}_duhem", arrays)
+        name = f"{axis}_duhem"
+        arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
+        duhem = _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
     direct = _surface_to(model.direct, f"{axis}_direct", arrays)
     return _Hysteresis(
         forward=forward, duhem=duhem, direct=direct, output=given, inverse=model.inverse
