@@ -31,16 +31,10 @@ from afm_scan_ros.cli.scanner import (
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import peak
 from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
-from afm_scan_ros.core.identification.drives.proposal import (
-    ConverterLimits,
-    Coverage,
-    ProposedRecord,
-    combined,
-    propose,
-)
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
@@ -50,14 +44,8 @@ from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
+from afm_scan_ros.report import plan_text
 from afm_scan_ros.report.html import Source, source_of
-from afm_scan_ros.report.plan_text import (
-    growth_row,
-    growth_table,
-    kept_text,
-    slope_text,
-    step_text,
-)
 from afm_scan_ros.report.table import Row
 
 
@@ -216,12 +204,12 @@ class PlannedCalibration:
 
     scanner: DrivenScanner
     out: Path
-    converter: ConverterLimits
+    converter: proposal.ConverterLimits
     limits: DriveLimits | None
     motion: MotionLimits
     scan_range: float
     hold: float
-    have: Coverage
+    have: proposal.Coverage
     _rows: list[Row] = field(factory=list, init=False)
 
     def run(self) -> list[Path]:
@@ -237,32 +225,32 @@ class PlannedCalibration:
             while record := self._next(have, {bag.name for bag in bags}):
                 self._grow(record, have)
                 bags.append(self.out / record.plan.name)
-                have = combined([have, covered(bags[-1])])
+                have = proposal.combined([have, covered(bags[-1])])
         finally:
             if self._rows:
-                table = growth_table(self._rows)
+                table = plan_text.growth_table(self._rows)
                 table.show()
                 table.save(self.out)
         return bags
 
-    def _next(self, have: Coverage, done: set[str]) -> ProposedRecord | None:
-        proposed = propose(self.converter, self.hold, self.scan_range, have)
+    def _next(self, have: proposal.Coverage, done: set[str]) -> proposal.ProposedRecord | None:
+        proposed = proposal.propose(self.converter, self.hold, self.scan_range, have)
         lacking = [record for record in proposed if record.plan.name not in done]
         return min(lacking, key=lambda record: ORDER.index(record.identifies), default=None)
 
-    def _grow(self, record: ProposedRecord, have: Coverage) -> None:
+    def _grow(self, record: proposal.ProposedRecord, have: proposal.Coverage) -> None:
         """Take a record, as large as the slew limit and the response allow."""
         name = record.plan.name
         steepest = record.steepest
         if self.limits is not None and steepest > self.limits.slew:
             share = (1.0 - ROUNDING) * self.limits.slew / steepest
-            click.echo(slope_text(name, share, steepest, self.limits.slew))
+            click.echo(plan_text.slope_text(name, share, steepest, self.limits.slew))
             record = record.scaled(share)
         largest = peak(record.plan)
         for number, watched in enumerate(grow(record, self._drive, self.motion, have), 1):
-            click.echo(step_text(name, number, largest, watched))
-        click.echo(kept_text(name, watched.step))
-        self._rows.append(growth_row(name, largest, watched))
+            click.echo(plan_text.step_text(name, number, largest, watched))
+        click.echo(plan_text.kept_text(name, watched.step))
+        self._rows.append(plan_text.growth_row(name, largest, watched))
 
     def _drive(self, plan: Plan[Waveform], step: GrowthStep) -> tuple[Trace, Trace]:
         name = plan.name if step.whole else f"{plan.name}_{1e3 * step.share:04.0f}"

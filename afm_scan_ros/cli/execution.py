@@ -9,14 +9,7 @@ import click
 from attrs import evolve
 
 from afm_scan_ros.bag.scan_info import ScanInfo, info_of_scan
-from afm_scan_ros.cli.orders import (
-    COMPENSATOR,
-    MONITOR,
-    Parameters,
-    RecordOrder,
-    ScanOrder,
-    settings_of,
-)
+from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
 from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
@@ -42,7 +35,7 @@ from afm_scan_ros.nodes.parameters import (
 from afm_scan_ros.pipeline import ScanChain, run
 
 
-def execute_scan(order: ScanOrder) -> None:
+def execute_scan(order: orders.ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
     if nodes_can_run():
         from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
@@ -52,7 +45,7 @@ def execute_scan(order: ScanOrder) -> None:
         _scan(order)
 
 
-def execute_record(order: RecordOrder) -> None:
+def execute_record(order: orders.RecordOrder) -> None:
     """Drive the scanner through a plan; raises as ``execute_scan`` does."""
     if nodes_can_run():
         from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
@@ -71,11 +64,11 @@ def nodes_can_run() -> bool:
     return not lacking
 
 
-def _scan(order: ScanOrder) -> None:
+def _scan(order: orders.ScanOrder) -> None:
     """Scan in this process."""
     files, spec = order.files, order.spec
     flow = _flow({**order.flow, **order.scanner.source}, str(files.spec))
-    own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    own = orders.settings_of(orders.COMPENSATOR, INVERSION, order.own.get(orders.COMPENSATOR, {}))
     given = inversion_settings({**own, "inverses": order.inverses})
     info = evolve(
         info_of_scan(spec, *identity(flow["scan_id"])),
@@ -98,7 +91,7 @@ def _scan(order: ScanOrder) -> None:
         run(chain, files.bag, shown)
 
 
-def _record(order: RecordOrder) -> None:
+def _record(order: orders.RecordOrder) -> None:
     """Drive the scanner through a plan in this process."""
     plan, flow = order.plan, _flow(order.scanner.source, order.plan.name)
     info = ScanInfo(*identity(""), plan.name, plan.sample_period, plan.total_samples)
@@ -130,17 +123,19 @@ def _flowing(info: ScanInfo, flow: Mapping[str, Any]) -> dict[str, Any]:
     return {"info": info, "block_size": size}
 
 
-def _driver(scanner: ScannerChoice, own: Parameters) -> DriverChoice:
+def _driver(scanner: ScannerChoice, own: orders.Parameters) -> DriverChoice:
     given = {**scanner.parameters, **own}
     if scanner.node == SIM_NODE:
-        return simulated_scanner(settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
+        return simulated_scanner(orders.settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
     return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
 
 
-def _monitor(order: ScanOrder) -> ScanMonitor | None:
+def _monitor(order: orders.ScanOrder) -> ScanMonitor | None:
     if not order.watched:
         return None
-    given = settings_of(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
+    given = orders.settings_of(
+        orders.MONITOR, (*ALARMS, *ADAPTATION), order.own.get(orders.MONITOR, {})
+    )
     adaptation = None
     if given["adapt"]:
         adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])

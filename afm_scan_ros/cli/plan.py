@@ -10,15 +10,8 @@ from afm_scan_ros.api.record import read_record
 from afm_scan_ros.cli.options import FOLDER, grouped, positive, quantity
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.proposal import (
-    MARGIN,
-    ConverterLimits,
-    Coverage,
-    combined,
-    coverage,
-    propose,
-)
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
@@ -41,11 +34,13 @@ def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -
     write_text(folder / "README.md", export_note(rates, axes))
 
 
-def covered(record: Path) -> Coverage:
+def covered(record: Path) -> proposal.Coverage:
     """Return what a record shows, all its axes together."""
     found = read_record(record)
     pairs = zip(found.drive.T, found.displacement.T, strict=True)
-    return combined(coverage(drive, moved, found.sample_period) for drive, moved in pairs)
+    return proposal.combined(
+        proposal.coverage(drive, moved, found.sample_period) for drive, moved in pairs
+    )
 
 
 @frozen
@@ -60,9 +55,9 @@ class PlanOptions:
     have: tuple[Path, ...]
 
     @property
-    def covered(self) -> Coverage:
+    def covered(self) -> proposal.Coverage:
         """What the records at hand show."""
-        return combined(covered(path) for path in self.have)
+        return proposal.combined(covered(path) for path in self.have)
 
     def range_for(self, model: ScannerModel | None = None) -> float:
         """Return the largest scan (m), by default that of a model; raises UsageError without."""
@@ -70,11 +65,11 @@ class PlanOptions:
             return self.scan_range
         if model is None:
             raise click.UsageError("give the largest scan with --range")
-        return min(2.0 * half_range_of(model.axis(name)) for name in model.axes) / MARGIN
+        return min(2.0 * half_range_of(model.axis(name)) for name in model.axes) / proposal.MARGIN
 
     def converter_for(
         self, model: ScannerModel | None = None, limits: DriveLimits | None = None
-    ) -> ConverterLimits:
+    ) -> proposal.ConverterLimits:
         """Return the converter, by default with the range of a model, or else a scanner's limits.
 
         Raises UsageError where nothing states a limit or the rate, InputError beyond the limits.
@@ -87,7 +82,7 @@ class PlanOptions:
                 f"a drive of {lower:g} to {upper:g} V is beyond the scanner's limit of"
                 f" {limits.voltage:g} V: give --limit and --lowest within it"
             )
-        return ConverterLimits(lower, upper, self.rate)
+        return proposal.ConverterLimits(lower, upper, self.rate)
 
     def _voltages(
         self, model: ScannerModel | None, limits: DriveLimits | None
@@ -147,7 +142,7 @@ def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> Non
     shows the resonance, from which the other records follow.
     """
     held = wanted.covered
-    proposed = propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
+    proposed = proposal.propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
     if not proposed:
         say("These records suffice.")
         return

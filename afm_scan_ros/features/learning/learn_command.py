@@ -13,14 +13,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.features.learning.loop import (
-    FEWEST,
-    SCANS,
-    LearningScan,
-    best_of,
-    lacking,
-    observations,
-)
+from afm_scan_ros.features.learning import loop
 from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.features.learning.report import (
     Taught,
@@ -48,8 +41,8 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @driven_options
 @click.option(
     "--scans",
-    type=click.IntRange(min=FEWEST),
-    default=SCANS,
+    type=click.IntRange(min=loop.FEWEST),
+    default=loop.SCANS,
     show_default=True,
     help="Number of scans; the first two have no correction.",
 )
@@ -74,7 +67,7 @@ def learn(
     limits = drive_limits_of(driven.scanner, driven.plant)
     refuse_existing(out / "bags")
     session = RecordedSession(driven, out)
-    done: list[LearningScan] = []
+    done: list[loop.LearningScan] = []
     failure, ended = "", None
     try:
         for each in learning_scans(session, base, wanted, scans, limits):
@@ -87,7 +80,7 @@ def learn(
         ended = error
         failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
-    save_learned(out / "learned.npz", best_of(done).correction, base)
+    save_learned(out / "learned.npz", loop.best_of(done).correction, base)
     _write(out, done, None, made, failure)
     show(learning_text(done))
     if diagnosed and not failure:
@@ -101,18 +94,20 @@ def learn(
         raise ScanError(f"learning ended after {len(done)} scans: {failure}")
 
 
-def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Provenance) -> Taught:
+def _taught(
+    model: ScannerModel, done: list[loop.LearningScan], out: Path, of: Provenance
+) -> Taught:
     """Diagnose the first scan and the learned one together."""
     with working("diagnosing") as progress:
-        found = diagnose(model, observations(done), progress)
-    best = best_of(done)
+        found = diagnose(model, loop.observations(done), progress)
+    best = loop.best_of(done)
     head = f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", found.model, head)
-    return Taught(found, lacking(model, best), lacking(found.model, best))
+    return Taught(found, loop.lacking(model, best), loop.lacking(found.model, best))
 
 
 def _write(
-    out: Path, done: list[LearningScan], taught: Taught | None, of: Provenance, failure: str
+    out: Path, done: list[loop.LearningScan], taught: Taught | None, of: Provenance, failure: str
 ) -> None:
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
