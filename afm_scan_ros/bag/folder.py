@@ -13,7 +13,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from afm_scan_ros.bag.mcap_file import HEAD, is_mcap, is_whole
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.unfolding import FREE, refuse_unfolding
+from afm_scan_ros.files.arrays import FREE, refuse_unfolding
 from afm_scan_ros.files.yaml import load
 
 VERSION = 9

@@ -16,7 +16,7 @@ from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
 from afm_scan_ros.bag import mcap_file
-from afm_scan_ros.files.unfolding import refuse_unfolding
+from afm_scan_ros.files.arrays import refuse_unfolding
 
 LARGEST = 2**23
 """Bytes of a summary that is read; that of a larger one is of a hundred thousand chunks."""
