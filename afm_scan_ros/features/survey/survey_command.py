@@ -13,10 +13,10 @@ import click
 from attrs import evolve, frozen
 
 from afm_scan_ros.api.model import load_model
-from afm_scan_ros.bag.collection import FoundBag, found_bags, instrument_of
 from afm_scan_ros.cli.options import FOLDER, RECORD, grouped, positive, working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag
+from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
 from afm_scan_ros.features.survey.changes import changes
 from afm_scan_ros.features.survey.folder import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.features.survey.page import Survey, alert, page, summary
