@@ -18,9 +18,9 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.writer import FileWriter
 from afm_scan_ros.cli import execution
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.main import run
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
-from afm_scan_ros.cli.run import run
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
