@@ -272,8 +272,6 @@ def _coupled(
                 f"{record.name}: its axes are {', '.join(record.axes)}, and those of the model"
                 f" {', '.join(model.axes)}: give records of the model's axes, in its order"
             )
-    if not all(error.by_band for error in model.coupled.errors):
-        raise InputError(f"{model.origin}: states no error by band: identify it again")
     found = diagnose_coupled(model.coupled, given, well, progress)
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
     return Diagnosis(extended, given, model, found)

@@ -69,7 +69,7 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
     after SIGINT or SIGTERM. The outputs are at rest then, and the bag holds what was recorded.
     """
     interrupted: list[int] = []
-    with _handling(signal.default_int_handler), TemporaryFile("w+", encoding="utf-8") as output:
+    with handling(signal.default_int_handler), TemporaryFile("w+", encoding="utf-8") as output:
         driver = DriverProcess(chain.driver, _timeouts(chain), output)
         try:
             with _ramping_down(chain, driver):
@@ -77,7 +77,7 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
             with (
                 LiveWriter(bag, chain.info, chain.streams) as writer,
                 ThreadPoolExecutor(1) as pool,
-                _handling(lambda number, _: interrupted.append(number)),
+                handling(lambda number, _: interrupted.append(number)),
                 _ramping_down(chain, driver),
             ):
                 recorder = LiveRecorder(writer, chain.info, listener)
@@ -280,7 +280,7 @@ def _add_notes(error: Exception, *notes: str) -> None:
 
 
 @contextmanager
-def _handling(handler: Callable[[int, Any], object]) -> Iterator[None]:
+def handling(handler: Callable[[int, Any], object]) -> Iterator[None]:
     """Handle SIGTERM and SIGINT, the latter also where a background shell had it ignored."""
     taken = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, handler) for number in taken]

@@ -131,7 +131,7 @@ def test_troubleshooting_quotes_messages_that_exist() -> None:
 
 def test_the_page_on_diagnosis_json_has_its_keys() -> None:
     page = (ROOT / "docs/reference/diagnosis_json.md").read_text("utf-8")
-    writers = ("account_document", "diagnosis_document", "_suggestion", "_effect", "_alternative")
+    writers = ("account_document", "diagnosis_document", "_effect", "_alternative")
     writers += ("_parameter", "residual_section", "_described")
     found = set()
     for path in (ROOT / "afm_scan_ros").rglob("*.py"):

@@ -1,16 +1,19 @@
-"""Which files a bag is made of, what is missing from it, and its ``metadata.yaml`` of version 9."""
+"""Which files a bag is made of, what is missing, what sizes are possible, and ``metadata.yaml``."""
 
 import re
+import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 from attrs import define, frozen
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
-from afm_scan_ros.bag.mcap_file import is_mcap, is_whole
-from afm_scan_ros.bag.mcap_sizes import refuse_sizes
+from afm_scan_ros.bag.mcap_file import HEAD, is_mcap, is_whole
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.files.arrays import FREE, refuse_unfolding
 from afm_scan_ros.files.yaml import load
 
 VERSION = 9
@@ -144,8 +147,40 @@ def bag_files(path: Path) -> BagFiles:
     for file in files:
         if not is_mcap(file):
             raise InputError(f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap'")
-        refuse_sizes(file)
+        _refuse_sizes(file)
     return BagFiles(files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f)))
+
+
+_CHUNK_HEAD = struct.Struct("<QQQ")  # both times of a chunk, and the bytes that it unpacks to
+_FEW = 10**5
+_LEAST = 50
+"""Records beside messages that any file may have, and bytes of each in a larger one at least.
+
+A chunk and its indices have more.
+"""
+
+
+def _refuse_sizes(path: Path) -> None:
+    """Raise InputError where a file states more than a recording of its size can hold."""
+    size, count, unpacked = path.stat().st_size, 0, 0
+    try:
+        with path.open("rb") as stream:
+            place = stream.seek(len(MCAP0_MAGIC))
+            while place + HEAD.size <= size and count <= _FEW + size / _LEAST:
+                kind, length = HEAD.unpack(stream.read(HEAD.size))
+                if kind == Opcode.CHUNK and place + HEAD.size + _CHUNK_HEAD.size <= size:
+                    *_, stated = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
+                    unpacked += stated if stated <= FREE else 0  # it is not unpacked
+                    refuse_unfolding(unpacked, size)
+                count += kind != Opcode.MESSAGE
+                place += HEAD.size + length
+                stream.seek(min(place, size))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+    if count > _FEW + size / _LEAST:
+        raise InputError(
+            f"{path}: over {count} records beside messages in {size} bytes: record it again"
+        )
 
 
 def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:

@@ -5,17 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
-from afm_scan_ros.bag.scan_info import (
-    LINE,
-    LINE_FIGURES,
-    MONITOR,
-    SAMPLE,
-    encode_line,
-    encode_sample,
-)
+from afm_scan_ros.bag import scan_info
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
-from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import (
     ACHIEVED,
     DRIVE,
@@ -50,19 +42,19 @@ class LiveWriter(ScanWriter):
     Each message bears the moment at which it is written.
     """
 
-    def __init__(self, folder: Path, info: ScanInfo, streams: Iterable[str]) -> None:
+    def __init__(self, folder: Path, info: scan_info.ScanInfo, streams: Iterable[str]) -> None:
         super().__init__(folder, info, streams)
-        self.add_topic(f"/{MONITOR}", SAMPLE)
-        for name in LINE_FIGURES:
-            self.add_topic(f"/{name}", LINE)
+        self.add_topic(f"/{scan_info.MONITOR}", scan_info.SAMPLE)
+        for name in scan_info.LINE_FIGURES:
+            self.add_topic(f"/{name}", scan_info.LINE)
 
     def add_line(self, name: str, figures: LineError) -> None:
         """Append the figures of one line, as of ``tracking_error``."""
-        self.put(name, figures.first_sample, encode_line(self._info, figures))
+        self.put(name, figures.first_sample, scan_info.encode_line(self._info, figures))
 
     def add_sample(self, sample: MonitorSample) -> None:
         """Append one sample for viewers."""
-        self.put(MONITOR, sample.sample, encode_sample(self._info, sample))
+        self.put(scan_info.MONITOR, sample.sample, scan_info.encode_sample(self._info, sample))
 
     def put(self, name: str, sample: int, cdr: bytes) -> None:  # noqa: ARG002 - the interface's
         """Append a message at the moment of this call."""
@@ -72,7 +64,7 @@ class LiveWriter(ScanWriter):
 class LiveRecorder:
     """Monitors and writes the blocks of a scan, those of a sample's drive before its answer."""
 
-    def __init__(self, bag: LiveWriter, info: ScanInfo, listener: ScanListener) -> None:
+    def __init__(self, bag: LiveWriter, info: scan_info.ScanInfo, listener: ScanListener) -> None:
         self._bag, self._info, self._listener = bag, info, listener
         self._errors: LineErrors | None = None
         if info.spec is not None:

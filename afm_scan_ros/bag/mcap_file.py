@@ -19,12 +19,13 @@ from mcap.stream_reader import CRCValidationError, read_magic
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.mcap_sizes import HEAD
 from afm_scan_ros.core.errors import InputError
 
 LARGEST = 2**27
 """Bytes that a chunk may unpack to; recorders write a few MB."""
 
+HEAD = struct.Struct("<BQ")
+"""Of a record: what it is, and its length."""
 _MESSAGE = struct.Struct("<HIQQ")  # of a message: channel, sequence, and both its times
 _MOST_OTHERS = 2**17
 """Records of a chunk that are no messages: schemas and channels have numbers of 16 bits each."""

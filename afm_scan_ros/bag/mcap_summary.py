@@ -15,18 +15,8 @@ from mcap.records import Channel, Chunk, ChunkIndex, Schema, Statistics
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
-from afm_scan_ros.bag.mcap_file import (
-    CUT,
-    Bounded,
-    RawMessage,
-    RepeatedLayout,
-    footer,
-    records,
-    runs,
-    unpacked,
-)
-from afm_scan_ros.bag.mcap_sizes import HEAD
-from afm_scan_ros.files.unfolding import refuse_unfolding
+from afm_scan_ros.bag import mcap_file
+from afm_scan_ros.files.arrays import refuse_unfolding
 
 LARGEST = 2**23
 """Bytes of a summary that is read; that of a larger one is of a hundred thousand chunks."""
@@ -39,22 +29,22 @@ def summary(path: Path) -> Summary | None:
     """Read the summary of a file; None where there is none, or none with a checksum that holds."""
     with path.open("rb") as stream:
         try:
-            start, checksum = footer(stream)
+            start, checksum = mcap_file.footer(stream)
             size = stream.seek(0, SEEK_END) - len(MCAP0_MAGIC) - CHECKSUM_SIZE - start
             if not start or size > LARGEST:
                 return None
             stream.seek(start)
             content = stream.read(size)
             return _summary(content) if zlib.crc32(content) == checksum else None
-        except (*CUT, OSError):
+        except (*mcap_file.CUT, OSError):
             return None
 
 
 def _summary(content: bytes) -> Summary:
     found, place, kind = Summary(), 0, 0
     while kind != Opcode.FOOTER:
-        kind, size = HEAD.unpack_from(content, place)
-        place += HEAD.size + size
+        kind, size = mcap_file.HEAD.unpack_from(content, place)
+        place += mcap_file.HEAD.size + size
         source = ReadDataStream(BytesIO(content[place - size : place]))
         if kind == Opcode.SCHEMA:
             schema: Schema = Schema.read(source)
@@ -69,7 +59,7 @@ def _summary(content: bytes) -> Summary:
     return found
 
 
-def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
+def outline(path: Path, wanted: str) -> Iterator[mcap_file.RawMessage]:
     """Yield each message of the type ``wanted``, and an empty one of each other topic.
 
     A file whose summary does not hold is read as a whole, with all its messages. Raises InputError
@@ -78,22 +68,22 @@ def outline(path: Path, wanted: str) -> Iterator[RawMessage]:
     found = summary(path)
     try:
         listed = None if found is None else list(_listed(path, found, wanted))
-    except CUT:
+    except mcap_file.CUT:
         listed = None
     yield from _read_through(path, wanted) if listed is None else listed
 
 
-def _read_through(path: Path, wanted: str) -> Iterator[RawMessage]:
+def _read_through(path: Path, wanted: str) -> Iterator[mcap_file.RawMessage]:
     seen: set[str] = set()
-    for run in runs(path):
+    for run in mcap_file.runs(path):
         if run.type_name == wanted:
-            yield from (RawMessage(run.topic, wanted, cdr.tobytes()) for cdr in run.cdrs)
+            yield from (mcap_file.RawMessage(run.topic, wanted, cdr.tobytes()) for cdr in run.cdrs)
         elif run.topic not in seen:
             seen.add(run.topic)
-            yield RawMessage(run.topic, run.type_name, b"")
+            yield mcap_file.RawMessage(run.topic, run.type_name, b"")
 
 
-def _listed(path: Path, found: Summary, wanted: str) -> Iterator[RawMessage]:
+def _listed(path: Path, found: Summary, wanted: str) -> Iterator[mcap_file.RawMessage]:
     if found.statistics is None or not all(i.message_index_offsets for i in found.chunk_indexes):
         raise McapError("no index of messages")
     schemas = {number: schema.name for number, schema in found.schemas.items()}
@@ -106,9 +96,9 @@ def _listed(path: Path, found: Summary, wanted: str) -> Iterator[RawMessage]:
             texts = Counter(islice(_of_channel(path, found, number), MOST_WANTED))
             if texts.total() != counts[number]:
                 raise McapError("the index lacks messages, or has very many")
-            yield from (RawMessage(channel.topic, type_name, cdr) for cdr in texts)
+            yield from (mcap_file.RawMessage(channel.topic, type_name, cdr) for cdr in texts)
         else:
-            yield RawMessage(channel.topic, type_name, b"")
+            yield mcap_file.RawMessage(channel.topic, type_name, b"")
 
 
 def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
@@ -118,10 +108,10 @@ def _of_channel(path: Path, found: Summary, number: int) -> Iterator[bytes]:
     size, unfolded = path.stat().st_size, 0
     with path.open("rb") as stream:
         for place in sorted(places):
-            data = unpacked(_chunk(stream, place))
+            data = mcap_file.unpacked(_chunk(stream, place))
             refuse_unfolding(unfolded := unfolded + len(data), size)
-            for record in records(data):
-                if isinstance(record, RepeatedLayout):
+            for record in mcap_file.records(data):
+                if isinstance(record, mcap_file.RepeatedLayout):
                     yield from map(bytes, record.cdrs[record.channels == number])
 
 
@@ -129,9 +119,9 @@ def _chunk(stream: BinaryIO, place: int) -> Chunk:
     size = stream.seek(0, SEEK_END)
     if place > size:
         raise McapError("an index of what lies behind the end")
-    bounded = Bounded(stream, size, stream.seek(place))
+    bounded = mcap_file.Bounded(stream, size, stream.seek(place))
     source = ReadDataStream(cast("BinaryIO", bounded))
-    kind, _ = HEAD.unpack(source.read(HEAD.size))
+    kind, _ = mcap_file.HEAD.unpack(source.read(mcap_file.HEAD.size))
     if kind != Opcode.CHUNK:
         raise McapError("no chunk where the index states")
     chunk: Chunk = Chunk.read(source)

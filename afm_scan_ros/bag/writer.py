@@ -1,9 +1,4 @@
-"""Writes one MCAP file of a bag, chunk by chunk.
-
-Writes a rosbag2 folder: ``metadata.yaml`` and the MCAP files beside it.
-
-Writes a scan that was computed in one process, as the nodes' recorder would have written it.
-"""
+"""Writes bags: MCAP files chunk by chunk, and the rosbag2 folder with its ``metadata.yaml``."""
 
 import shutil
 from collections.abc import Iterable, Iterator

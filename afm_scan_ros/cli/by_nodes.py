@@ -1,11 +1,12 @@
 """A scan or a record by nodes, a process each; needs ROS."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from attrs import evolve
 
+from afm_scan_ros.cli.listening import watching
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import (
     COMPENSATOR,
@@ -16,9 +17,8 @@ from afm_scan_ros.cli.orders import (
     file_of,
     settings_of,
 )
-from afm_scan_ros.cli.processes import NodeCommand, isolate, pace, run_nodes
+from afm_scan_ros.cli.processes import PATIENCE, NodeCommand, isolate, run_nodes
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.cli.watch import watching
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -35,7 +35,7 @@ PIXELS = 256
 
 def scan(order: ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
-    paced = pace(order.time_scale)
+    paced = _pace(order.time_scale)
     commands = [_with(c, {**paced, **order.own.get(c.name, {})}) for c in _scan_commands(order)]
     _run(commands, order.scanner, f"scan to {order.files.bag}")
 
@@ -44,8 +44,8 @@ def record(order: RecordOrder) -> None:
     """Drive the scanner through a plan; raises as ``scan`` does."""
     with TemporaryDirectory() as folder:
         drive_file = save_drive(Path(folder), order.plan)
-        commands = _record_commands(order, drive_file)
-        commands = [_with(command, pace(order.time_scale)) for command in commands]
+        paced = _pace(order.time_scale)
+        commands = [_with(command, paced) for command in _record_commands(order, drive_file)]
         _run(commands, order.scanner, order.title)
 
 
@@ -56,7 +56,14 @@ def _run(commands: Sequence[NodeCommand], scanner: ScannerChoice, title: str) ->
         run_nodes(commands, idle, [scanner.node])
 
 
-def _with(command: NodeCommand, parameters: Mapping[str, object]) -> NodeCommand:
+def _pace(time_scale: float) -> Parameters:
+    """Return the parameters of every node for the pace; without one, a block may take long."""
+    if time_scale:
+        return {"time_scale": time_scale}
+    return {"time_scale": 0.0, "real_time": False, "liveness_timeout_s": PATIENCE}
+
+
+def _with(command: NodeCommand, parameters: Parameters) -> NodeCommand:
     return evolve(command, parameters={**command.parameters, **parameters})
 
 

@@ -1,16 +1,18 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import Any
 
 import click
 
-from afm_scan_ros.cli.driving import DrivenScanner, PlannedCalibration, run_calibration
-from afm_scan_ros.cli.options import FILE, FOLDER, positive
+from afm_scan_ros.cli.driving import (
+    DrivenScanner,
+    PlannedCalibration,
+    driven_options,
+    run_calibration,
+)
+from afm_scan_ros.cli.options import FILE, FOLDER, grouped, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
-from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
+from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan
 from afm_scan_ros.core.identification.drives.experiments import (
     EXPERIMENTS,
@@ -30,12 +32,6 @@ from afm_scan_ros.files.model_file import load_model
 Size = tuple[float | None, float | None]
 """Amplitude (V) and duration (s) of a drive; its own where they are None."""
 OWN_SIZE: Size = None, None
-
-
-def _purposes() -> str:
-    """Each experiment and what it is for, as click prints a list."""
-    lines = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
-    return "\n\n".join(("Experiments:", *lines))
 
 
 def _drive(kind: str, model: ScannerModel | None, size: Size, rate: float | None) -> Plan[Waveform]:
@@ -59,39 +55,39 @@ def _next(out: Path, experiment: str | None) -> str:
     return f"diagnose it together with the bags of the ambiguous diagnosis: {command}"
 
 
-def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add an experiment and its size to a command, which gets both as ``experiment``."""
+def _experiment(
+    experiment: str | None, amplitude: float | None, duration: float | None
+) -> tuple[str | None, Size]:
+    size = amplitude, duration
+    if experiment is None and size != OWN_SIZE:
+        raise click.UsageError("--amplitude and --duration size an --experiment: give it too")
+    return experiment, size
 
-    @click.option(
+
+experiment_options = grouped(
+    "experiment",
+    _experiment,
+    click.option(
         "--experiment", type=click.Choice(tuple(EXPERIMENTS)), help="Record only this experiment."
-    )
-    @click.option(
+    ),
+    click.option(
         "--amplitude",
         type=positive("V"),
         help="With --experiment: its largest voltage, from the middle of the drive.",
-    )
-    @click.option(
+    ),
+    click.option(
         "--duration",
         type=positive("s"),
         help="With --experiment: its length. All times change in proportion.",
-    )
-    @wraps(command)
-    def with_experiment(
-        experiment: str | None,
-        amplitude: float | None,
-        duration: float | None,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        size = amplitude, duration
-        if experiment is None and size != OWN_SIZE:
-            raise click.UsageError("--amplitude and --duration size an --experiment: give it too")
-        command(experiment=(experiment, size), **options)
-
-    return with_experiment
+    ),
+)
 
 
-@click.command(epilog=_purposes())
-@scanner_options
+PURPOSES = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENTS.items())
+
+
+@click.command(epilog="\n\n".join(("Experiments:", *PURPOSES)))
+@driven_options
 @click.option(
     "--out",
     type=FOLDER,
@@ -103,7 +99,6 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=FOLDER,
     help="Drive nothing: write the drives to this folder as CSV and npz, for a lab's converter.",
 )
-@seed_option
 @click.option(
     "--model",
     type=FILE,
@@ -120,20 +115,16 @@ def experiment_options(command: Callable[..., None]) -> Callable[..., None]:
     type=positive("m"),
     help="Largest peak of the resonance beyond the steady displacement.  [default: half the range]",
 )
-@time_scale_option
 @experiment_options
 def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    plant: Path,
-    scanner: str,
+    driven: DrivenScanner,
     out: Path | None,
     experiment: tuple[str | None, Size],
     folder: Path | None,
-    seed: int,
     model: Path | None,
     wanted: PlanOptions,
     travel: float | None,
     excitation: float | None,
-    time_scale: float | None,
 ) -> None:
     """Drive the scanner with steps, multisines, loops and random moves, and record each.
 
@@ -150,7 +141,6 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         return
     if out is None:
         raise click.UsageError("give a folder for the bags with --out, or one with --export")
-    driven = DrivenScanner(scanner, plant, seed, time_scale)
     if name is None and (known or wanted.scan_range):
         limits = driven.limits
         scan_range = wanted.range_for(known)
@@ -163,10 +153,11 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         bags = [*wanted.have, *planned.run()]
         advice = f"afm-scan identify {' '.join(map(str, bags))} --out model.yaml"
     else:
-        plans = _default_drives(scanner, name, known, size, wanted.rate)
+        plans = _default_drives(driven.scanner, name, known, size, wanted.rate)
         run_calibration(driven, out, plans)
         advice = _next(out, name)
-    recorded = f"the simulated scanner of {plant}" if scanner == SIM else f"scanner {scanner}"
+    of = driven.scanner
+    recorded = f"the simulated scanner of {driven.plant}" if of == SIM else f"scanner {of}"
     click.echo(f"Recorded {recorded} in {out}.")
     click.echo(f"next: {advice}")
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
+from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
-from afm_scan_ros.cli.scanner import SIM, scanner_options, seed_option, time_scale_option
-from afm_scan_ros.cli.session import RecordedSession
+from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT
@@ -39,7 +39,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     "--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is diagnosed and repeated."
 )
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to extend.")
-@scanner_options
+@driven_options
 @click.option(
     "--out",
     required=True,
@@ -53,18 +53,7 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     show_default=True,
     help="Largest number of rounds.",
 )
-@seed_option
-@time_scale_option
-def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    spec: Path,
-    model: Path,
-    plant: Path,
-    scanner: str,
-    out: Path,
-    rounds: int,
-    seed: int,
-    time_scale: float | None,
-) -> None:
+def close_loop(spec: Path, model: Path, driven: DrivenScanner, out: Path, rounds: int) -> None:
     """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
@@ -72,10 +61,10 @@ def close_loop(  # noqa: PLR0913, PLR0917 - click hands over one parameter an op
     """
     base = _base_model(model)
     diagnosed, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    if scanner == SIM:
-        load_plant(plant)
+    if driven.scanner == SIM:
+        load_plant(driven.plant)
     refuse_existing(out / "bags")
-    session = RecordedSession(plant, out, seed, scanner, time_scale)
+    session = RecordedSession(driven, out)
     done: list[Round] = []
 
     def provenance(records: Sequence[Source]) -> Provenance:

@@ -1,4 +1,7 @@
-"""The command ``afm-scan``: finds the subcommand, and ends with one line and a status."""
+"""The command ``afm-scan``: finds the subcommand, and ends with one line and a status.
+
+``afm-scan run`` runs one node, where there is no ``ros2 run``.
+"""
 
 import sys
 import warnings
@@ -11,6 +14,7 @@ import click
 from afm_scan_ros import features
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.files import version
+from afm_scan_ros.nodes import NODES, lacking_ros, start
 from afm_scan_ros.report.terminal import complain, showing_log
 
 COMMANDS = {
@@ -34,6 +38,7 @@ MODULES = {
     "analyze": "recorded",
     "diagnose": "recorded",
     "invert": "import_csv",
+    "run": "main",
 }
 """Modules of the commands that do not stand in one of their name."""
 
@@ -116,6 +121,23 @@ def cli(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:  # click from 8.2 on would call that an error
         click.echo(ctx.get_help())
+
+
+@click.command(
+    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
+    epilog=f"Nodes: {', '.join(NODES)}.",
+)
+@click.argument("name", type=click.Choice(NODES), metavar="NAME")
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+def run(name: str, arguments: tuple[str, ...]) -> int:
+    """Run the node NAME with the arguments of 'ros2 run afm_scan_ros NAME'.
+
+    For example: afm-scan run scan_recorder --ros-args -p bag:=scan1
+    """
+    if lacking := lacking_ros():
+        raise InputError(f"run: {lacking}; a node needs ROS 2, the other commands do not")
+    sys.argv = [name, *arguments]
+    return start(name)
 
 
 def _end(message: object, status: int) -> NoReturn:

@@ -6,13 +6,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from inspect import signature
 from pathlib import Path
 from time import monotonic
 from types import MappingProxyType
 from typing import Any
 
 import click
-from attrs import evolve, frozen
+from attrs import frozen
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -28,6 +29,27 @@ from afm_scan_ros.files.units import A_NUMBER, METRES, SECONDS, VOLTS, in_ascii
 from afm_scan_ros.report.terminal import complain, say, showing_log, visible
 
 CONFIG = share_directory() / "config"
+Command = Callable[..., None]
+
+
+def grouped(
+    name: str, made: Callable[..., object], *options: Callable[[Command], Command]
+) -> Callable[[Command], Command]:
+    """Add options to a command, which gets as ``name`` what is ``made`` of their values."""
+    taken = signature(made).parameters
+
+    def with_group(command: Command) -> Command:
+        @wraps(command)
+        def called(**given: Any) -> None:  # noqa: ANN401 - the command's own
+            own = {each: given.pop(each) for each in taken if each in given}
+            command(**{name: made(**own)}, **given)
+
+        decorated: Command = called
+        for option in reversed(options):
+            decorated = option(decorated)
+        return decorated
+
+    return with_group
 
 
 class _Path(click.Path):
@@ -180,32 +202,21 @@ class TableOptions:
         )
 
 
-def table_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add options for what tables do not state to a command, which gets it as ``tables``."""
-
-    @click.option(
+TABLE = (
+    click.option(
         "--columns",
         help="What the columns of tables hold: NAME=COLUMN:UNIT, separated by commas. NAME is time,"
         " or drive, achieved or desired with _x or _y. COLUMN is a number from 1 or a heading, UNIT"
         " one as mV, nm, -um or 8um/V. Not needed where the headings state it, as 'drive_x [V]'.",
-    )
-    @click.option("--sample-rate", type=positive("Hz"), help="If no column is time, as 20kHz.")
-    @click.option(
+    ),
+    click.option("--sample-rate", type=positive("Hz"), help="If no column is time, as 20kHz."),
+    click.option(
         "--skip-rows",
         type=click.IntRange(0),
         default=0,
         help="Lines to skip at the top of tables. A heading is found without.",
-    )
-    @wraps(command)
-    def with_tables(
-        columns: str | None,
-        sample_rate: float | None,
-        skip_rows: int,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        command(tables=TableOptions(columns, sample_rate, skip_rows), **options)
-
-    return with_tables
+    ),
+)
 
 
 def _parsed_topics(
@@ -222,30 +233,16 @@ def _parsed_topics(
     return found
 
 
-def topic_option(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what bags do not say themselves to a command, which gets it as ``topics``."""
-    return click.option(
-        "--topic",
-        "topics",
-        metavar="NAME=/TOPIC",
-        multiple=True,
-        callback=_parsed_topics,
-        help="Topic of a bag that is achieved_displacement, drive_voltage, desired_displacement or"
-        " scan_info. Not needed where its name or its message type says it.",
-    )(command)
-
-
-def record_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what tables and bags do not say themselves to a command, which gets it as ``tables``."""
-
-    @table_options
-    @topic_option
-    @wraps(command)
-    def with_topics(
-        tables: TableOptions,
-        topics: Mapping[str, str],
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        command(tables=evolve(tables, topics=topics), **options)
-
-    return with_topics
+topic_option = click.option(
+    "--topic",
+    "topics",
+    metavar="NAME=/TOPIC",
+    multiple=True,
+    callback=_parsed_topics,
+    help="Topic of a bag that is achieved_displacement, drive_voltage, desired_displacement or"
+    " scan_info. Not needed where its name or its message type says it.",
+)
+table_options = grouped("tables", TableOptions, *TABLE)
+"""What tables do not state."""
+record_options = grouped("tables", TableOptions, *TABLE, topic_option)
+"""What tables and bags do not state."""

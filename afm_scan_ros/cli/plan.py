@@ -1,26 +1,17 @@
 """``afm-scan plan``: the records that would identify a scanner, or that are still lacking."""
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
-from attrs import fields, frozen
+from attrs import frozen
 
 from afm_scan_ros.bag.record import read_record
-from afm_scan_ros.cli.options import FOLDER, positive, quantity
+from afm_scan_ros.cli.options import FOLDER, grouped, positive, quantity
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.proposal import (
-    MARGIN,
-    ConverterLimits,
-    Coverage,
-    combined,
-    coverage,
-    propose,
-)
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
@@ -43,11 +34,13 @@ def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -
     write_text(folder / "README.md", export_note(rates, axes))
 
 
-def covered(record: Path) -> Coverage:
+def covered(record: Path) -> proposal.Coverage:
     """Return what a record shows, all its axes together."""
     found = read_record(record)
     pairs = zip(found.drive.T, found.displacement.T, strict=True)
-    return combined(coverage(drive, moved, found.sample_period) for drive, moved in pairs)
+    return proposal.combined(
+        proposal.coverage(drive, moved, found.sample_period) for drive, moved in pairs
+    )
 
 
 @frozen
@@ -62,9 +55,9 @@ class PlanOptions:
     have: tuple[Path, ...]
 
     @property
-    def covered(self) -> Coverage:
+    def covered(self) -> proposal.Coverage:
         """What the records at hand show."""
-        return combined(covered(path) for path in self.have)
+        return proposal.combined(covered(path) for path in self.have)
 
     def range_for(self, model: ScannerModel | None = None) -> float:
         """Return the largest scan (m), by default that of a model; raises UsageError without."""
@@ -72,11 +65,11 @@ class PlanOptions:
             return self.scan_range
         if model is None:
             raise click.UsageError("give the largest scan with --range")
-        return min(2.0 * half_range_of(model.axis(name)) for name in model.axes) / MARGIN
+        return min(2.0 * half_range_of(model.axis(name)) for name in model.axes) / proposal.MARGIN
 
     def converter_for(
         self, model: ScannerModel | None = None, limits: DriveLimits | None = None
-    ) -> ConverterLimits:
+    ) -> proposal.ConverterLimits:
         """Return the converter, by default with the range of a model, or else a scanner's limits.
 
         Raises UsageError where nothing states a limit or the rate, InputError beyond the limits.
@@ -89,7 +82,7 @@ class PlanOptions:
                 f"a drive of {lower:g} to {upper:g} V is beyond the scanner's limit of"
                 f" {limits.voltage:g} V: give --limit and --lowest within it"
             )
-        return ConverterLimits(lower, upper, self.rate)
+        return proposal.ConverterLimits(lower, upper, self.rate)
 
     def _voltages(
         self, model: ScannerModel | None, limits: DriveLimits | None
@@ -106,37 +99,32 @@ class PlanOptions:
         return (-limit if lowest is None else lowest), limit
 
 
-def plan_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a plan to a command, which gets them as ``wanted``."""
-
-    @click.option(
+plan_options = grouped(
+    "wanted",
+    PlanOptions,
+    click.option(
         "--range",
         "scan_range",
         type=positive("m"),
         help="Largest scan. It limits the drives once a record shows the gain.",
-    )
-    @click.option("--limit", type=positive("V"), help="Highest drive voltage.")
-    @click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]")
-    @click.option("--rate", type=positive("Hz"), help="Samples a second of the converter.")
-    @click.option(
+    ),
+    click.option("--limit", type=positive("V"), help="Highest drive voltage."),
+    click.option("--lowest", type=quantity("V"), help="Lowest drive voltage.  [default: -LIMIT]"),
+    click.option("--rate", type=positive("Hz"), help="Samples a second of the converter."),
+    click.option(
         "--hold",
         type=positive("s"),
         default="5min",
         show_default=True,
         help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
-    )
-    @click.option(
+    ),
+    click.option(
         "--have",
         type=click.Path(exists=True, path_type=Path),
         multiple=True,
         help="Record at hand; give one or more. What it shows is not proposed again.",
-    )
-    @wraps(command)
-    def with_plan(**given: Any) -> None:  # noqa: ANN401 - the command's own
-        own = {each.name: given.pop(each.name) for each in fields(PlanOptions)}
-        command(wanted=PlanOptions(**own), **given)
-
-    return with_plan
+    ),
+)
 
 
 @click.command()
@@ -154,7 +142,7 @@ def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> Non
     shows the resonance, from which the other records follow.
     """
     held = wanted.covered
-    proposed = propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
+    proposed = proposal.propose(wanted.converter_for(), wanted.hold, wanted.range_for(), held)
     if not proposed:
         say("These records suffice.")
         return

@@ -22,6 +22,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.flow import STOPPED
+from afm_scan_ros.pipeline import TRACEBACK, handling
 
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise
 
@@ -70,7 +71,6 @@ _START = (
 )
 
 
-TRACEBACK = "Traceback (most recent call last)"
 LOG = "traceback.log"
 """File in a bag's folder."""
 _LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
@@ -148,22 +148,18 @@ class NodeProcess:
         return self.output.read()
 
 
-def pace(time_scale: float) -> Mapping[str, object]:
-    """Return the parameters of every node for the pace; without one, a block may take long."""
-    if time_scale:
-        return {"time_scale": time_scale}
-    return {"time_scale": 0.0, "real_time": False, "liveness_timeout_s": PATIENCE}
-
-
 def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:
     """Rename the bags of a run that failed to NAME.failed, so that it can be tried again.
 
     An earlier NAME.failed is replaced. The last of them also gets the tracebacks that the ``error``
     has as notes. Returns where all this is, to follow the error's text.
     """
-    kept = [
-        bag.rename(_emptied(bag.with_name(f"{bag.name}.failed"))) for bag in bags if bag.exists()
-    ]
+    kept = []
+    for bag in (each for each in bags if each.exists()):
+        failed = bag.with_name(f"{bag.name}.failed")
+        if failed.exists():
+            shutil.rmtree(failed)
+        kept.append(bag.rename(failed))
     if not kept:
         return ""
     where = f"; what was recorded is in {', '.join(map(str, kept))}"
@@ -171,12 +167,6 @@ def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:
         (kept[-1] / LOG).write_text("\n".join(notes), "utf-8")
         where += f", the traceback in {kept[-1] / LOG}"
     return where
-
-
-def _emptied(folder: Path) -> Path:
-    if folder.exists():
-        shutil.rmtree(folder)
-    return folder
 
 
 def run_nodes(
@@ -187,20 +177,9 @@ def run_nodes(
     ``others`` are nodes that may have begun the trouble too, wherever they run.
     Raises InputError or ScanError with the messages of the nodes that failed first.
     """
-    taken = (signal.SIGINT, signal.SIGTERM)  # the first too: a background shell has it ignored
-    before = [signal.signal(number, signal.default_int_handler) for number in taken]
-    try:
-        _run_processes(commands, idle, [*(command.name for command in commands), *others])
-    finally:
-        for number, handler in zip(taken, before, strict=True):
-            signal.signal(number, handler)
-
-
-def _run_processes(
-    commands: Sequence[NodeCommand], idle: Callable[[], None], names: Sequence[str]
-) -> None:
+    names = [*(command.name for command in commands), *others]
     running: list[NodeProcess] = []
-    with ExitStack() as open_ends:
+    with handling(signal.default_int_handler), ExitStack() as open_ends:
         try:
             for command in commands:
                 running.append(NodeProcess.start(command))

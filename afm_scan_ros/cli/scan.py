@@ -8,6 +8,7 @@ from typing import TypedDict, Unpack
 
 import click
 
+from afm_scan_ros.cli.execution import execute_scan
 from afm_scan_ros.cli.options import BAG, CONFIG, FILE, refuse_existing
 from afm_scan_ros.cli.orders import (
     COMPENSATOR,
@@ -30,7 +31,6 @@ from afm_scan_ros.cli.scanner import (
     scanner_options,
     time_scale_option,
 )
-from afm_scan_ros.cli.ways import scan_as_ordered
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
@@ -93,7 +93,7 @@ def run_scan(
         files, spec, flow, model, inverses, scanner, time_scale, every, images, watched
     )
     try:
-        scan_as_ordered(order)
+        execute_scan(order)
     except (InputError, ScanError) as error:
         raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 

@@ -137,9 +137,11 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
 def _external() -> ScannerChoice:
     if lacking := lacking_ros():
         raise InputError(f"--scanner {EXTERNAL}: {lacking}; a scanner node needs ROS 2")
-    from afm_scan_ros.cli.external import found_scanner  # noqa: PLC0415 - needs ROS
+    from afm_scan_ros.cli.listening import found_scanner  # noqa: PLC0415 - needs ROS
 
-    node, known = found_scanner(SCANNERS, _longest_wait())
+    context = click.get_current_context(silent=True)
+    wait = PATIENCE if context is None else float(context.meta.get(_WAIT, PATIENCE))
+    node, known = found_scanner(SCANNERS, wait)
     return ScannerChoice(node, knows_true=known, external=True)
 
 
@@ -160,7 +162,6 @@ def pace_of(scanner: str) -> float:
     return 0.0 if scanner == SIM else 1.0
 
 
-seed_option = click.option("--seed", default=1, show_default=True, help="Seed of the sensor noise.")
 time_scale_option = click.option(
     "--time-scale",
     type=float,
@@ -198,17 +199,11 @@ def scanner_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_scanner(scanner: str, plant: Path | None, **options: Any) -> None:  # noqa: ANN401 - the command's own
         if plant is not None and scanner != SIM:
             raise click.UsageError("--plant is the simulated scanner: give it with --scanner sim")
-        _refuse_incomplete(scanner)
+        if lacking := [*_settings_lacking(scanner), *_model_lacking(scanner)]:
+            raise InputError(f"--scanner {scanner}: {'; '.join(lacking)}")
         command(scanner=scanner, plant=plant or PLANT, **options)
 
     return with_scanner
-
-
-def _refuse_incomplete(scanner: str) -> None:
-    """Raise InputError where a scanner lacks its settings, or its own model."""
-    lacking = [*_settings_lacking(scanner), *_model_lacking(scanner)]
-    if lacking:
-        raise InputError(f"--scanner {scanner}: {'; '.join(lacking)}")
 
 
 def _settings_lacking(scanner: str) -> Iterator[str]:
@@ -234,11 +229,6 @@ def _model_lacking(scanner: str) -> Iterator[str]:
 def _keep_wait(ctx: click.Context, _: click.Parameter, seconds: float | None) -> None:
     if seconds is not None:
         ctx.meta[_WAIT] = seconds
-
-
-def _longest_wait() -> float:
-    context = click.get_current_context(silent=True)
-    return PATIENCE if context is None else float(context.meta.get(_WAIT, PATIENCE))
 
 
 def driver_and_file(scanner: str) -> tuple[str, Path]:

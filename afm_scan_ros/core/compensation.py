@@ -203,12 +203,8 @@ def _common(ahead: Blocks, blocks: Blocks) -> tuple[Blocks, Blocks]:
     pairs = zip(ahead, blocks, strict=True)
     joined = [np.concatenate(pair) if len(pair[0]) else pair[1] for pair in pairs]
     count = min(len(each) for each in joined)
-    return [_after(count, each) for each in joined], [each[:count] for each in joined]
-
-
-def _after(count: int, samples: Array) -> Array:
-    """Return the samples after so many, which keeps nothing of those before."""
-    return samples[count:].copy() if len(samples) > count else NOTHING
+    left = [each[count:].copy() if len(each) > count else NOTHING for each in joined]  # no views
+    return left, [each[:count] for each in joined]
 
 
 BLOCK = 5000

@@ -63,14 +63,13 @@ class LevelError:
     """Error of a simulation of records that the fit did not see, at one level of the drive.
 
     ``drive_rms`` (V) and ``displacement_rms`` (m) are over all channels, as is ``error_rms`` (m).
-    ``by_band`` is the error over the displacement in parts of equal width of the model's band;
-    empty where a file does not state it.
+    ``by_band`` is the error over the displacement in parts of equal width of the model's band.
     """
 
     drive_rms: float
     error_rms: float
     displacement_rms: float
-    by_band: tuple[float, ...] = ()
+    by_band: tuple[float, ...]
 
     @property
     def relative(self) -> float:

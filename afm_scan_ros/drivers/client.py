@@ -14,22 +14,8 @@ from attrs import asdict
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.drivers import DriverChoice
+from afm_scan_ros.drivers import DriverChoice, link
 from afm_scan_ros.drivers.guarded import Displacement
-from afm_scan_ros.drivers.link import (
-    ALIVE,
-    DRIVE,
-    ENDED,
-    OPEN,
-    OPENED,
-    START,
-    STOP,
-    DriverTimeouts,
-    Link,
-    Message,
-    late,
-    ramp_bound,
-)
 from afm_scan_ros.files.records import to_mapping
 
 _RUN = "import sys; from afm_scan_ros.drivers.process import main; main(int(sys.argv[1]))"
@@ -48,7 +34,7 @@ class DriverProcess:
     """
 
     def __init__(
-        self, choice: DriverChoice, waits: DriverTimeouts, output: IO[str] | None = None
+        self, choice: DriverChoice, waits: link.DriverTimeouts, output: IO[str] | None = None
     ) -> None:
         self.outcome: str | None = None
         self._waits, self._settings = waits, choice.settings
@@ -68,7 +54,7 @@ class DriverProcess:
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
-        self._link = Link(ours)
+        self._link = link.Link(ours)
         self._link.patience = self._waits.rest
         self._ask_to_open(choice)
 
@@ -90,7 +76,9 @@ class DriverProcess:
     def start(self, sample_period: float) -> None:
         """Ask the driver to prepare for one sample period (s)."""
         self._period = sample_period
-        self._request(Message(START, {"sample_period": sample_period}), self._waits.opening)
+        self._request(
+            link.Message(link.START, {"sample_period": sample_period}), self._waits.opening
+        )
 
     def advance(self, drive: Trace, *, last: bool) -> None:
         """Ask the driver to output a block (V), the ``last`` of a scan or not."""
@@ -101,7 +89,7 @@ class DriverProcess:
             "last": last,
         }
         allowed = self._waits.for_answer(drive, self.latency_samples)
-        self._request(Message(DRIVE, asked, np.stack([drive.x, drive.y])), allowed)
+        self._request(link.Message(link.DRIVE, asked, np.stack([drive.x, drive.y])), allowed)
 
     def answer(self, wait: float) -> Displacement | None:
         """Return the displacement once it is there; None for none within ``wait`` s.
@@ -112,10 +100,10 @@ class DriverProcess:
         """
         if not self._link.readable(wait):
             if time.monotonic() - self._asked > self._allowed:
-                raise ScanError(late(self._allowed))
+                raise ScanError(link.late(self._allowed))
             return None
         message = self._take()
-        if message.kind == OPENED:
+        if message.kind == link.OPENED:
             return None
         self.waiting = False
         if (block := self._block) is None:
@@ -135,7 +123,7 @@ class DriverProcess:
             return
         if self._link.readable(0.0):
             self._take()  # unasked, it only ever says that it has ended
-        self._send(Message(ALIVE))
+        self._send(link.Message(link.ALIVE))
 
     def ramp_down(self, why: str) -> str:
         """Bring the outputs to rest, end the driver, and return why and how, within seconds.
@@ -145,10 +133,10 @@ class DriverProcess:
         """
         latency = self.latency_samples * self._period
         return_of_block = self._waits.rest if self.waiting and self._block else 0.0
-        ramp = ramp_bound(self._settings, latency, self._waits.rest)
+        ramp = link.ramp_bound(self._settings, latency, self._waits.rest)
         deadline = time.monotonic() + return_of_block + ramp
         with suppress(InputError, ScanError):
-            self._send(Message(STOP))
+            self._send(link.Message(link.STOP))
             while self._link.readable(max(0.0, deadline - time.monotonic())):
                 self._take(why)
             self._end(f"{why}; the driver has not said that the drive is at rest")
@@ -177,16 +165,16 @@ class DriverProcess:
             "waits": asdict(self._waits),
         }
         try:
-            self._send(Message(OPEN, asked))
+            self._send(link.Message(link.OPEN, asked))
         except (InputError, ScanError):
             self.close()
             raise
 
-    def _request(self, message: Message, allowed: float) -> None:
+    def _request(self, message: link.Message, allowed: float) -> None:
         self._send(message)
         self.waiting, self._asked, self._allowed = True, time.monotonic(), allowed
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: link.Message) -> None:
         if self.outcome is not None:
             raise ScanError(self.outcome)
         try:
@@ -196,7 +184,7 @@ class DriverProcess:
                 self._take()
         self._next_sign = time.monotonic() + self._waits.sign_of_life
 
-    def _take(self, why: str = "") -> Message:
+    def _take(self, why: str = "") -> link.Message:
         """Return the next message; raises the error with which the driver has ended.
 
         ``why`` is the reason where it was asked to end.
@@ -209,7 +197,7 @@ class DriverProcess:
             asked = f"{why}; " if why else ""
             at_rest = "; the drive may not be at rest" if self._block else ""
             self._end(f"{asked}{self._fate()}{at_rest}")
-        if message.kind == ENDED:
+        if message.kind == link.ENDED:
             self._end_with(message.fields, why)
         return message
 

@@ -12,7 +12,7 @@ from attrs.validators import gt
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.drivers import DriverChoice
-from afm_scan_ros.drivers.guarded import SensorWatch
+from afm_scan_ros.drivers.guarded import SensorWatch, held_after
 from afm_scan_ros.files.columns import parse_columns, read_table_record
 from afm_scan_ros.files.records import from_mapping
 from afm_scan_ros.files.text_table import EVERY
@@ -53,8 +53,7 @@ class FileExchange:
         """
         self.settings.amplifier.limits.refuse_beyond(drive, dict.fromkeys(AXES, 0.0))
         late = self.settings.latency_samples
-        x, y = (np.pad(drive.axis(axis), (0, late), "edge") for axis in AXES)
-        held = Trace(drive.first_sample, drive.sample_period, x, y)
+        held = held_after(drive, late)
         target = self._folder / f"{name}.csv"
         record = target.with_name(f"{name}.measured.csv")
         self._write(target, record, held)

@@ -20,9 +20,12 @@ from afm_scan_ros.drivers import (
     open_driver,
     samples_in,
 )
-from afm_scan_ros.drivers.readings import checked
 
 LOST = "the sensor is lost: check its cable and its supply"
+PERIOD_ROUNDING = 1e-6
+"""Relative error of a sample period that was once a float32."""
+PLAIN = (np.ndarray, np.memmap, np.ma.MaskedArray)
+"""Arrays whose numbers alone say what they hold, as those of a library with units do not."""
 
 
 class SensorWatch:
@@ -99,6 +102,12 @@ class SensorWatch:
         self._high = np.where(self._same, np.fmax(self._high, mean), np.nan)
 
 
+def held_after(drive: Trace, late: int) -> Trace:
+    """Return a drive that is held at its end for so many samples."""
+    x, y = (np.pad(drive.axis(axis), (0, late), "edge") for axis in AXES)
+    return Trace(drive.first_sample, drive.sample_period, x, y)
+
+
 @frozen
 class Displacement:
     """Displacement (m): as measured, and without noise where the driver knows that."""
@@ -156,7 +165,7 @@ class GuardedDriver:
         """
         self._refuse(drive)
         self._before = {axis: float(drive.axis(axis)[-1]) for axis in AXES}
-        answer = self._answer(self._held_after(drive) if last else drive)
+        answer = self._answer(held_after(drive, self.latency_samples) if last else drive)
         read, true = self._dated(answer.sensor), self._dated(answer.true) if answer.true else None
         self._next_sample += read.x.size
         self._early -= answer.sensor.x.size - read.x.size
@@ -183,12 +192,71 @@ class GuardedDriver:
         self._watch.check(drive, answer.sensor)
         return answer
 
-    def _held_after(self, drive: Trace) -> Trace:
-        late = self.latency_samples
-        x, y = (np.pad(drive.axis(axis), (0, late), "edge") for axis in AXES)
-        return Trace(drive.first_sample, drive.sample_period, x, y)
-
     def _dated(self, late: Trace) -> Trace:
         """Return readings as of the samples of their displacement, without those before it."""
         known = slice(self._early, None)
         return Trace(self._next_sample, late.sample_period, late.x[known], late.y[known])
+
+
+def checked(answer: object, drive: Trace, *, knows_true: bool) -> Reading:
+    """Return a driver's answer to a block of drive as float64, at the samples of the block.
+
+    Raises ScanError naming the sample, the axis and what does not hold.
+    """
+    where = f"sample {drive.first_sample}"
+    if not isinstance(answer, Reading) or not isinstance(answer.sensor, Trace):
+        raise ScanError(f"{where}: advance of the driver must return Reading(Trace(...))")
+    sensor = _at_the_samples(answer.sensor, drive, "readings")
+    if (answer.true is not None) is not knows_true:
+        raise ScanError(
+            f"{where}: KNOWS_TRUE of the driver is {knows_true}, but its Reading has"
+            f" {'no' if knows_true else 'a'} true displacement"
+        )
+    if answer.true is None:
+        return Reading(sensor)
+    true = _at_the_samples(answer.true, drive, "true displacement")
+    for axis in AXES:
+        if not np.all(finite := np.isfinite(true.axis(axis))):
+            place = drive.first_sample + int(np.argmin(finite))
+            raise ScanError(f"sample {place}, axis {axis}: the true displacement is not finite")
+    return Reading(sensor, true)
+
+
+def _at_the_samples(given: object, drive: Trace, what: str) -> Trace:
+    """Return samples as float64; raises ScanError where they are not those of the drive."""
+    where = f"sample {drive.first_sample}: the driver's {what}"
+    if not isinstance(given, Trace):
+        raise ScanError(f"{where} must be a Trace, and not {_kind(given)}")
+    first, period = given.first_sample, given.sample_period
+    if not isinstance(first, Real) or first != drive.first_sample:
+        raise ScanError(f"{where}: first_sample = {first} is not that of the drive")
+    close = isinstance(period, Real) and math.isclose(
+        period, drive.sample_period, rel_tol=PERIOD_ROUNDING
+    )
+    if not close:
+        raise ScanError(
+            f"{where}: sample_period = {period} is not that of the drive, {drive.sample_period:g}"
+        )
+    x, y = (_floats(given.axis(axis), drive, what, axis) for axis in AXES)
+    return Trace(drive.first_sample, drive.sample_period, x, y)
+
+
+def _floats(given: Array, drive: Trace, what: str, axis: str) -> Array:
+    """Return the samples of an axis as contiguous float64, as they are where they are that."""
+    where = f"sample {drive.first_sample}, axis {axis}: the driver's {what}"
+    if type(given) not in PLAIN or given.dtype.kind not in "fiu":
+        raise ScanError(f"{where} must be a plain array of real numbers, and not {_kind(given)}")
+    if given.shape != drive.x.shape:
+        raise ScanError(
+            f"{where}, of shape {given.shape}, must have that of the drive, {drive.x.shape}"
+        )
+    if np.ma.is_masked(given):
+        place = drive.first_sample + int(np.argmax(np.ma.getmaskarray(given)))
+        raise ScanError(f"sample {place}, axis {axis}: masked in the driver's {what}, so none")
+    with np.errstate(over="ignore"):  # what no float64 can hold is out of every range
+        return np.ascontiguousarray(given, dtype=np.float64)
+
+
+def _kind(given: object) -> str:
+    name = type(given).__name__
+    return f"{name} of {given.dtype}" if isinstance(given, np.ndarray) else name

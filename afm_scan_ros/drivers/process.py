@@ -13,33 +13,20 @@ import signal
 import socket
 import sys
 import time
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers import OURS, ScannerSettings
+from afm_scan_ros.drivers import OURS, ScannerSettings, link
 from afm_scan_ros.drivers.calls import bounded, ending_after, take_priority, taken_over_after
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
-from afm_scan_ros.drivers.link import (
-    DRIVE,
-    ENDED,
-    MOVED,
-    OPENED,
-    START,
-    STARTED,
-    STOP,
-    DriverTimeouts,
-    Link,
-    Message,
-    late,
-    ramp_bound,
-)
 from afm_scan_ros.drivers.safety import SafetySettings
-from afm_scan_ros.drivers.words import described, printable, refusing
 from afm_scan_ros.files.records import from_mapping
 
 SILENT = "the node has been silent for {:g} s"
@@ -51,10 +38,10 @@ SHORTEST = 1e-3
 class DriverHost:
     """Runs one driver as the other end of the link asks."""
 
-    _link: Link
+    _link: link.Link
     _driver: GuardedDriver | None = None
     _settings: ScannerSettings = field(init=False)
-    _waits: DriverTimeouts = field(init=False)
+    _waits: link.DriverTimeouts = field(init=False)
     _started: bool = False
     _late: float = 0.0
     _silence: float = math.inf
@@ -82,7 +69,7 @@ class DriverHost:
 
     def _work(self) -> None:
         asked = self._next().fields
-        self._waits = DriverTimeouts(**asked["waits"])
+        self._waits = link.DriverTimeouts(**asked["waits"])
         where = asked["where"]
         self._settings = from_mapping(ScannerSettings, asked["settings"], where)
         name = asked["driver"]
@@ -90,11 +77,11 @@ class DriverHost:
             sys.path.append(os.getcwd())  # noqa: PTH109 - last, so that it hides no module
         with refusing(f"driver {name}"), bounded("__init__", self._waits.opening, self._waits.rest):
             self._driver = GuardedDriver(name, self._settings, asked["options"], where)
-        self._answer(Message(OPENED, {"knows_true": self._driver.knows_true}))
-        while (message := self._next()).kind != STOP:
-            if message.kind == START:
+        self._answer(link.Message(link.OPENED, {"knows_true": self._driver.knows_true}))
+        while (message := self._next()).kind != link.STOP:
+            if message.kind == link.START:
                 self._start(self._driver, message.fields["sample_period"])
-            elif message.kind == DRIVE:
+            elif message.kind == link.DRIVE:
                 self._move(self._driver, message)
 
     def _start(self, driver: GuardedDriver, sample_period: float) -> None:
@@ -108,9 +95,9 @@ class DriverHost:
         gc.freeze()  # a full collection of what is loaded takes 80 ms, as long as four blocks
         priority = take_priority() if self._waits.real_time else "no real-time priority: no need"
         started = {"latency_samples": driver.latency_samples, "priority": priority}
-        self._answer(Message(STARTED, started))
+        self._answer(link.Message(link.STARTED, started))
 
-    def _move(self, driver: GuardedDriver, message: Message) -> None:
+    def _move(self, driver: GuardedDriver, message: link.Message) -> None:
         begun, self._silence = time.monotonic(), self._waits.silence
         asked = message.fields
         block = Trace(asked["first_sample"], asked["sample_period"], *message.samples)
@@ -121,7 +108,7 @@ class DriverHost:
         self._drive_due = max(time.monotonic(), lasts) + more
         traces = [trace for trace in (answer.measured, answer.true) if trace is not None]
         rows = np.stack([trace.axis(axis) for trace in traces for axis in AXES])
-        self._answer(Message(MOVED, {"first_sample": answer.measured.first_sample}, rows))
+        self._answer(link.Message(link.MOVED, {"first_sample": answer.measured.first_sample}, rows))
 
     def _advance(self, driver: GuardedDriver, block: Trace, *, last: bool) -> Displacement:
         """Let the driver advance; where it is late, ramp down meanwhile if that can be."""
@@ -131,13 +118,13 @@ class DriverHost:
                 return driver.advance(block, last=last)
 
         def take_over() -> None:
-            self._report(late(bound), self._ramp_down())
+            self._report(link.late(bound), self._ramp_down())
             os._exit(1)
 
         with ending_after(bound + self._ramp_bound), taken_over_after(bound, take_over):
             return driver.advance(block, last=last)
 
-    def _next(self) -> Message:
+    def _next(self) -> link.Message:
         """Wait for a message, no longer than the watchdog allows."""
         left = self._drive_due - time.monotonic()
         if left < self._silence:
@@ -148,7 +135,7 @@ class DriverHost:
         with self._watching(self._silence, SILENT.format(self._silence)):
             return self._link.receive()
 
-    def _answer(self, message: Message) -> None:
+    def _answer(self, message: link.Message) -> None:
         """Send a message; a node that does not receive it counts as silent."""
         with self._watching(self._silence, SILENT.format(self._silence)):
             self._link.send(message)
@@ -170,11 +157,11 @@ class DriverHost:
         said = printable(ramp) if isinstance(ramp, str) else ramp
         with suppress(OSError):  # nobody may be left to hear it
             fields = {"why": printable(why), "bad_input": bad_input, "ramp": said}
-            self._link.send(Message(ENDED, fields))
+            self._link.send(link.Message(link.ENDED, fields))
 
     @property
     def _ramp_bound(self) -> float:
-        return ramp_bound(self._settings, self._late, self._waits.rest)
+        return link.ramp_bound(self._settings, self._late, self._waits.rest)
 
     def _ramp_down(self) -> float | str:
         """Bring the outputs to rest; return how long it took (s), or why they may not be."""
@@ -187,9 +174,56 @@ class DriverHost:
             return f"the ramp-down failed ({described(error)})"
 
 
+def printable(text: str) -> str:
+    """Return a text with each control character, ends of lines too, as Python writes it."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+@contextmanager
+def refusing(what: str) -> Iterator[None]:
+    """Raise InputError for whatever a driver raises before it moves, and log where it did."""
+    try:
+        yield
+    except (InputError, ScanError):
+        raise
+    except Exception as error:
+        _log(error)
+        raise InputError(f"{what}: {_worded(error)}") from error
+
+
+def described(error: BaseException | None) -> str:
+    """Say what ended the work, and where if nobody foresaw it; log its traceback then."""
+    if error is None or isinstance(error, InputError | ScanError):
+        return str(error or "")
+    _log(error)
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    with suppress(Exception):  # the outputs matter more
+        *_, place = traceback.extract_tb(error.__traceback__)
+        said += f" ({Path(place.filename).name}, line {place.lineno})"
+    return said
+
+
+def _worded(error: Exception) -> str:
+    """Return what an exception says, by its name where that is nothing, or a key alone."""
+    said, name = str(error), type(error).__name__
+    if isinstance(error, LookupError):
+        return f"{name}: {said}"
+    return said or name
+
+
+def _log(error: BaseException) -> None:
+    """Print a traceback, where that is possible: the outputs matter more.
+
+    Each line is marked, so that no text of an exception looks like a line of its own.
+    """
+    with suppress(Exception):
+        lines = "".join(traceback.format_exception(error)).rstrip("\n").split("\n")
+        sys.stderr.write("".join(f"| {printable(line)}\n" for line in lines))
+
+
 def main(descriptor: int) -> None:
     """Run the process whose end of the link is this file descriptor."""
-    host = DriverHost(Link(socket.socket(fileno=descriptor)))
+    host = DriverHost(link.Link(socket.socket(fileno=descriptor)))
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda number, _: host.interrupt(number))
     host.run()

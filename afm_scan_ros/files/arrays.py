@@ -1,8 +1,9 @@
-"""Arrays in .npy and .npz files that need not be trusted."""
+"""Arrays in .npy and .npz files that need not be trusted, and how much any file may unfold to."""
 
 import hashlib
 import io
 import math
+import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +16,32 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.files.unfolding import refuse_unfolding
+
+FREE = 2**28
+"""Bytes that any file may unfold to, however small it is: a drive at rest folds to nothing."""
+MOST_TIMES = 64
+"""Times its own size that a larger file may unfold to.
+
+A number has 64 bits at most, and a sensor's one bit of noise at least, which no compression
+leaves out. What folds further holds no recording.
+"""
+
+
+def refuse_unfolding(unfolded: int, folded: int) -> None:
+    """Raise ValueError where so many bytes are no recording, or more than the computer's memory.
+
+    ``unfolded`` is what a file states of ``folded`` bytes.
+    """
+    if unfolded > max(FREE, MOST_TIMES * folded):
+        raise ValueError(
+            f"{folded} bytes unfold to {unfolded}, over {MOST_TIMES} times as many, as no recording"
+            " does: save it without compression"
+        )
+    if unfolded > (there := os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")):
+        raise ValueError(
+            f"unfolds to {unfolded} bytes, and this computer's memory has {there}: give a part"
+        )
+
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 _HEADER = 2**16

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from attrs import field, frozen
-from attrs.validators import deep_iterable, gt, matches_re
+from attrs.validators import deep_iterable, gt, matches_re, min_len
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, FeedbackEffect, LevelError
 from afm_scan_ros.core.effects.effect_type import Actuators
@@ -27,7 +27,7 @@ class _LevelError:
     drive_rms: float = field(metadata={"suffix": "_v"}, validator=gt(0.0))
     error_rms: float = field(metadata={"suffix": "_nm", "scale": 1e-9}, validator=gt(0.0))
     displacement_rms: float = field(metadata={"suffix": "_nm", "scale": 1e-9}, validator=gt(0.0))
-    by_band: tuple[float, ...] = field(default=(), validator=deep_iterable(gt(0.0)))
+    by_band: tuple[float, ...] = field(validator=[min_len(1), deep_iterable(gt(0.0))])
 
 
 @frozen

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from afm_scan_ros.files.unfolding import refuse_unfolding
+from afm_scan_ros.files.arrays import refuse_unfolding
 
 HEADER = 128
 """Bytes of text, version and byte order before the first element."""

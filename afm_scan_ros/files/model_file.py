@@ -52,13 +52,6 @@ from afm_scan_ros.files.arrays import Archive
 from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, refuse_unknown, to_mapping
 
-FORMER_KINDS = {
-    ("cross_coupling", "leg"): "coupled_mode",
-    ("extra_resonance", "absorber"): "absorber_mode",
-    ("extra_resonance", "rider"): "series_mode",
-}
-"""Kinds of earlier files, by what they are called now."""
-
 ROOM = 0.01
 """Share of a bound by which a value may exceed it: another identification has another scale."""
 Parameters = Sequence[EffectParameter]
@@ -78,8 +71,7 @@ def added_from(items: Iterable[AddedEffect], scale: Scale) -> tuple[Added, ...]:
     found = []
     for number, item in enumerate(items):
         with naming(f"added[{number}]"):
-            kind = FORMER_KINDS.get((item.name, item.kind), item.kind)
-            form = effect_type(item.name).form(kind).at(scale)
+            form = effect_type(item.name).form(item.kind).at(scale)
             found.append(Added(item.name, form.kind, values_of(item, form.parameters)))
     return tuple(found)
 
@@ -98,24 +90,11 @@ def listed(name: str, kind: str, values: Sequence[float], parameters: Parameters
     return AddedEffect(name, kind, {p.name: {"value": v, "unit": p.unit} for v, p in pairs})
 
 
-def former_key(parameter: EffectParameter) -> str:
-    """Key by which earlier files give a number alone, as ``rate_m_per_s``."""
-    if parameter.unit == "1":
-        return parameter.name
-    return f"{parameter.name}_{parameter.unit.replace('/', '_per_').lower()}"
-
-
 def values_of(item: AddedEffect, parameters: Parameters) -> tuple[float, ...]:
     """Values of an item's parameters in their order; raises InputError naming key and fix."""
-    given = item.parameters
-    former = {former_key(p): p for p in parameters}
-    numbers = not any(isinstance(each, dict) for each in given.values())
-    if given and numbers and set(given) <= set(former):
-        pairs = ((former[key], value) for key, value in given.items())
-        given = {p.name: {"value": value, "unit": p.unit} for p, value in pairs}
-    refuse_unknown(given, (p.name for p in parameters), "parameters")
+    refuse_unknown(item.parameters, (p.name for p in parameters), "parameters")
     with naming("parameters"):
-        return tuple(_value(p, given) for p in parameters)
+        return tuple(_value(p, item.parameters) for p in parameters)
 
 
 def _value(parameter: EffectParameter, given: dict[str, Any]) -> float:
@@ -388,19 +367,16 @@ def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
     return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)
 
 
-def _slopes_to(of: DuhemSlopes, name: str, arrays: Arrays) -> _Slopes:
-    arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
-    return _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
-
-
 def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
-    behind, operator = model.output, model.forward
+    behind, of = model.output, model.forward
     given = None if behind is None else recast(_OutputMap, behind)
     forward = duhem = None
-    if isinstance(operator, EverettSurface):
-        forward = _surface_to(operator, f"{axis}_forward", arrays)
+    if isinstance(of, EverettSurface):
+        forward = _surface_to(of, f"{axis}_forward", arrays)
     else:
-        duhem = _slopes_to(operator, f"{axis}_duhem", arrays)
+        name = f"{axis}_duhem"
+        arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
+        duhem = _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
     direct = _surface_to(model.direct, f"{axis}_direct", arrays)
     return _Hysteresis(
         forward=forward, duhem=duhem, direct=direct, output=given, inverse=model.inverse

@@ -41,7 +41,8 @@ def save_scan(path: Path, spec: ScanSpec, heading: str) -> None:
 
 def node_parameters(content: Mapping[str, Any], where: str, node: str = NODE) -> dict[str, Any]:
     """Parameters that a file in ROS's form gives a node, later ones winning."""
-    sections = {name: body for name, body in content.items() if _is_for_node(name, node)}
+    names = {name: f"/{name.removeprefix('/**/').removeprefix('/')}" for name in content}
+    sections = {name: content[name] for name in names if fnmatch(f"/{node}", names[name])}
     if not sections:
         raise InputError(f"{where}: no section for the node; begin it with '/**/{node}:'")
     given: dict[str, Any] = {}
@@ -51,10 +52,6 @@ def node_parameters(content: Mapping[str, Any], where: str, node: str = NODE) ->
         refuse_unknown(body, [PARAMETERS], f"{where}: {name}")
         given.update(body[PARAMETERS])
     return given
-
-
-def _is_for_node(section: str, node: str) -> bool:
-    return fnmatch(f"/{node}", f"/{section.removeprefix('/**/').removeprefix('/')}")
 
 
 BASE, MECHANISMS, KIND = "base", "mechanisms", "kind"

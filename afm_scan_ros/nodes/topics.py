@@ -16,13 +16,21 @@ from afm_scan_ros.msg import (
 from afm_scan_ros.nodes.messages import Message
 
 
-def _latched(depth: int) -> QoSProfile:
+def _last(
+    depth: int,
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
+) -> QoSProfile:
     return QoSProfile(
         depth=depth,
         history=HistoryPolicy.KEEP_LAST,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        reliability=reliability,
+        durability=durability,
     )
+
+
+def _latched(depth: int) -> QoSProfile:
+    return _last(depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 # A keep-last reader loses blocks silently, even where delivery is reliable.
@@ -31,25 +39,11 @@ _EVERYTHING = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
-
-
 # One message a line, of which the last ones are kept for a reader that is behind: viewers plot
 # them, and one that hangs cannot make the monitor wait.
-_LINES = QoSProfile(
-    depth=1000,
-    history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
-
-
+_LINES = _last(1000)
 # Viewers alone read it: none of them can make a node wait.
-_FOR_VIEWERS = QoSProfile(
-    depth=200,
-    history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.BEST_EFFORT,
-    durability=DurabilityPolicy.VOLATILE,
-)
+_FOR_VIEWERS = _last(200, ReliabilityPolicy.BEST_EFFORT)
 
 
 @frozen(eq=False)
@@ -84,12 +78,6 @@ SCAN_INFO = NodeTopic("scan_info", ScanInfo, _latched(1), _latched(1))
 # Every node writes its own last state; a reader keeps those of many.
 NODE_STATE = NodeTopic("node_state", NodeState, _latched(1), _latched(100))
 # The last status is all that counts, so no reader can make a node wait.
-_LAST = QoSProfile(
-    depth=1,
-    history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
-DIAGNOSTICS = NodeTopic("/diagnostics", DiagnosticArray, _LAST, QoSProfile(depth=100))
+DIAGNOSTICS = NodeTopic("/diagnostics", DiagnosticArray, _last(1), QoSProfile(depth=100))
 
 BLOCKS = {topic.name: topic for topic in (DESIRED, DRIVE, ACHIEVED, TRUE)}

@@ -17,7 +17,6 @@ from afm_scan_ros.core.diagnosis.likelihood import BandFit, known_freedom, known
 from afm_scan_ros.core.diagnosis.residual_report import Description, ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
 from afm_scan_ros.core.diagnosis.search import Selection
-from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
@@ -35,10 +34,9 @@ Document = dict[str, Any]
 
 
 def account_document(found: ResidualReport) -> Document:
-    """Return a diagnosis as the file has it, with its suggestions and its residual described."""
+    """Return a diagnosis as the file has it, with its residual described."""
     return {
         **diagnosis_document(found.diagnosis),
-        "suggestions": [_suggestion(each) for each in found.suggestions],
         "residual": residual_section(found),
         "likelihood": {
             axis: _likelihood(diagnosed.selection)
@@ -77,19 +75,6 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
 def save_diagnosis(path: Path, document: Document) -> None:
     """Write a document; numbers that are not finite have no place in it."""
     write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
-
-
-def _suggestion(found: Suggestion) -> Document:
-    terms = zip(found.symbols, found.coefficients, found.units, strict=True)
-    return {
-        "axis": found.axis,
-        "equation": found.equation,
-        "terms": [
-            {"term": symbol, "coefficient_nm": value, "per_unit": unit}
-            for symbol, value, unit in terms
-        ],
-        "explained_fraction": found.explained,
-    }
 
 
 def _effect(effect: IdentifiedEffect) -> Document:

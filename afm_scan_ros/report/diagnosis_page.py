@@ -28,7 +28,6 @@ from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
     LIMITS,
-    SUGGESTED,
     TRIED,
     VERDICTS,
     Row,
@@ -40,7 +39,6 @@ from afm_scan_ros.report.diagnosis_text import (
     probability_text,
     result,
     share_text,
-    suggestion_text,
     why_not_text,
 )
 from afm_scan_ros.report.html import Provenance, heading_lines, provenance_section
@@ -110,10 +108,6 @@ def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
     if diagnosis.effects:
         yield html.heading("Evidence for the effects")
         yield from _effects(found)
-    if found.suggestions:
-        yield html.heading("Equations that no effect of the catalogue contains")
-        yield html.paragraph(SUGGESTED)
-        yield from html.texts(map(suggestion_text, found.suggestions))
     if tried := alternative_rows(diagnosis):
         yield html.heading("Alternatives")
         yield html.table(TRIED, tried)

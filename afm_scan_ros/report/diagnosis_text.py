@@ -25,7 +25,6 @@ from afm_scan_ros.core.diagnosis.discrepancy import MotionByBand
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
-from afm_scan_ros.core.diagnosis.suggestion import Suggestion
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
@@ -55,11 +54,6 @@ VERDICTS = {
     " the catalogue explains it. The model is not extended.",
 }
 """Sentences for each verdict."""
-
-SUGGESTED = (
-    "These equations were searched in the data alone. They name no mechanism, and none is added to"
-    " the model. They show where to look."
-)
 
 LIMITS = {
     "feedforward": "The inverse of the extended model compensates it",
@@ -138,7 +132,10 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
     elif found.effects:
         yield "Scan with model.extended.yaml in place of the model."
     else:
-        yield "Every proposed experiment is recorded. Its description shows what remains."
+        yield (
+            "Every proposed experiment is recorded. The description of the residual states what it"
+            " depends on: look there for the cause."
+        )
     for effect in found.effects:
         listed = effect_type(effect.name)
         advice = listed.advice[0].upper() + listed.advice[1:]
@@ -348,21 +345,12 @@ def _above_limit(of: AboveDetectionLimit) -> str:
 
 
 def unexplained_text(found: ResidualReport) -> Iterator[str]:
-    """Yield what is known of each residual that stays unexplained, and what is suggested."""
+    """Yield what is known of each residual that stays unexplained."""
     for axis, diagnosed in found.diagnosis.by_axis.items():
         if diagnosed.verdict == UNEXPLAINED:
             record = most_excited_record(diagnosed)
             known = residual_text(found.before[axis][record], diagnosed.evidence[record].limit)
             yield f"The residual in {axis}: {chosen_text(diagnosed)}{' '.join(known)}"
-    yield from (suggestion_text(each) for each in found.suggestions)
-
-
-def suggestion_text(found: Suggestion) -> str:
-    """Say what equation is suggested, and how much of the residual it explains."""
-    return (
-        f"Suggestion: {found.equation}. It explains {found.explained:.0%} of the residual's mean"
-        " square on held-out stretches."
-    )
 
 
 def _credible(found: ScannerDiagnosis, axis: str) -> Iterator[str]:

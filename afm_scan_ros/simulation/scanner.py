@@ -26,15 +26,8 @@ from afm_scan_ros.simulation.axis import (
     first_resonance,
     quantity,
 )
+from afm_scan_ros.simulation.mechanisms import base
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, Attachment
-from afm_scan_ros.simulation.mechanisms.base import (
-    Ageing,
-    Alteration,
-    Bank,
-    Blocks,
-    Insert,
-    Mechanism,
-)
 
 
 @frozen
@@ -63,11 +56,11 @@ class PlantSpec:
     x: AxisSpec
     y: AxisSpec
     sensor_sensitivity: float = quantity(ge(1e-9), le(1e-3), suffix="_m_per_v")
-    mechanisms: tuple[Mechanism, ...] = ()
+    mechanisms: tuple[base.Mechanism, ...] = ()
 
     def older(self, by: float) -> "PlantSpec":
         """Return the scanner ``by`` s later: only mechanisms that age are others."""
-        aged = (m.older(by) if isinstance(m, Ageing) else m for m in self.mechanisms)
+        aged = (m.older(by) if isinstance(m, base.Ageing) else m for m in self.mechanisms)
         return evolve(self, mechanisms=tuple(aged))
 
     def axes(self) -> dict[str, AxisSpec]:
@@ -145,7 +138,7 @@ class SimulatedChain:
 def _links(spec: PlantSpec, step: float) -> Sequence[SimulatedElement]:
     axes = _axes(spec)
     dynamics = [Dynamics.from_spec(axis, spec.sensor_sensitivity) for axis in axes.values()]
-    inserts = [each for each in spec.mechanisms if isinstance(each, Insert)]
+    inserts = [each for each in spec.mechanisms if isinstance(each, base.Insert)]
     stages = {name: AttachedStage.of_pole(first_resonance(a.vibration)) for name, a in axes.items()}
     attachments = (each for each in spec.mechanisms if isinstance(each, Attachment))
     return (
@@ -161,23 +154,23 @@ def _axes(spec: PlantSpec) -> dict[str, AxisSpec]:
     """What each axis is made of by now."""
     axes = spec.axes()
     for mechanism in spec.mechanisms:
-        if isinstance(mechanism, Alteration):
+        if isinstance(mechanism, base.Alteration):
             axes[mechanism.axis] = mechanism.altered(axes[mechanism.axis])
     return axes
 
 
 def _hysteresis(
-    axes: Mapping[str, AxisSpec], mechanisms: Iterable[Mechanism], step: float
+    axes: Mapping[str, AxisSpec], mechanisms: Iterable[base.Mechanism], step: float
 ) -> PerAxis:
     """Drive (V) to effective input F (V) of each axis."""
     plays = {name: PlayBank.from_spec(axis.hysteresis) for name, axis in axes.items()}
-    blocks = (each for each in mechanisms if isinstance(each, Blocks))
+    blocks = (each for each in mechanisms if isinstance(each, base.Blocks))
     dragged = {each.axis: each.bank(plays[each.axis], step) for each in blocks}
     banks = [dragged.get(name, plays[name]) for name in AXES]
     return PerAxis(tuple(b.relaxed for b in banks), tuple(map(_held, banks)))
 
 
-def _held(bank: Bank) -> Callable[[Any, Array, float], tuple[Any, Array]]:
+def _held(bank: base.Bank) -> Callable[[Any, Array, float], tuple[Any, Array]]:
     """Return how a bank, which knows its step, moves."""
     return lambda state, drive, _step: bank.apply(state, drive)
 

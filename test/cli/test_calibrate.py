@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import by_pipeline
+from afm_scan_ros.cli import execution
 from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -118,13 +118,13 @@ excitation.excitation_block = slowly
 @pytest.fixture
 def slow_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _at_start_of_each_process(SLOW_SOURCE, tmp_path, monkeypatch)
-    block = by_pipeline.excitation_block
+    block = execution.excitation_block
 
     def slowly(plan: Plan[Waveform], first: int, count: int) -> Trace:
         time.sleep(2.0 if first else 0.0)
         return block(plan, first, count)
 
-    monkeypatch.setattr(by_pipeline, "excitation_block", slowly)
+    monkeypatch.setattr(execution, "excitation_block", slowly)
 
 
 @pytest.fixture

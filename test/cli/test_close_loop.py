@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import close_loop as command
-from afm_scan_ros.cli.session import RecordedSession
+from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession
 from afm_scan_ros.core.diagnosis import search as selection
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -63,7 +63,7 @@ def close(folder: Path, plant: str, *entries: str) -> Run:
         patch.setattr(
             command,
             "RecordedSession",
-            lambda plant, _, seed, *__: OneProcess(load_plant(plant), seed),
+            lambda driven, _: OneProcess(load_plant(driven.plant), driven.seed),
         )
         return Run(folder / "out", CliRunner().invoke(command.close_loop, list(map(str, words))))
 
@@ -229,7 +229,7 @@ def test_what_was_reached_before_a_failure_is_written(tmp_path: Path) -> None:
 
 def test_nodes_scan_as_one_process_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    by_nodes = RecordedSession(CONFIG / "plant.yaml", tmp_path, seed=7)
+    by_nodes = RecordedSession(DrivenScanner(seed=7), tmp_path)
     in_process = InProcessSession(load_plant(CONFIG / "plant.yaml"), seed=7)
     model = default_model()
     one, other = (each.scan("same_0", SPEC, model) for each in (by_nodes, in_process))

@@ -3,7 +3,6 @@
 import json
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
-from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
@@ -44,15 +42,6 @@ class InProcess:
     stops: str = "never"
     gain: float = 1.0
     plans: list[Plan[Waveform]] = field(factory=list)
-    given: DrivenScanner = field(factory=DrivenScanner)
-
-    def __call__(self, scanner: str, *rest: Any) -> "InProcess":  # noqa: ANN401 - the options
-        self.given = DrivenScanner(scanner, *rest)
-        return self
-
-    @property
-    def limits(self) -> DriveLimits | None:
-        return self.given.limits
 
     def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
         self.plans.append(plan)
@@ -68,7 +57,7 @@ class InProcess:
 
 def calibrate(scanner: InProcess, *words: str) -> Result:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "DrivenScanner", scanner)
+        patch.setattr(DrivenScanner, "record", lambda _, *given: scanner.record(*given))
         return CliRunner().invoke(command.calibrate, words)
 
 

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from afm_scan_ros.cli import session
-from afm_scan_ros.cli.options import CONFIG
+from afm_scan_ros.cli import driving
 from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import Trace
@@ -30,9 +29,9 @@ def test_each_scan_begins_as_old_as_those_before_took(
         info = info_of_scan(FAST_SPEC, "scan", 0)
         return SimpleNamespace(topics=(), info=info, whole=lambda _: trace)
 
-    monkeypatch.setattr(session, "run_scan", run_scan)
-    monkeypatch.setattr(session, "read_scan", read_scan)
-    made = session.RecordedSession(CONFIG / "plant.yaml", tmp_path, seed=1)
+    monkeypatch.setattr(driving, "run_scan", run_scan)
+    monkeypatch.setattr(driving, "read_scan", read_scan)
+    made = driving.RecordedSession(driving.DrivenScanner(), tmp_path)
     for label in ("first", "second", "third"):
         made.scan(label, FAST_SPEC, default_model())
     took = TOTAL * FAST_SPEC.sample_period

@@ -16,11 +16,11 @@ from click.testing import CliRunner
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.writer import FileWriter
-from afm_scan_ros.cli import ways
+from afm_scan_ros.cli import execution
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
+from afm_scan_ros.cli.main import run
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
-from afm_scan_ros.cli.run import run
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
@@ -49,9 +49,9 @@ def found(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[str]]:
         "afm_scan_ros.nodes.find_spec",
         lambda name: ModuleSpec(name, None) if name in names else None,
     )
-    ways.nodes_can_run.cache_clear()
+    execution.nodes_can_run.cache_clear()
     yield names
-    ways.nodes_can_run.cache_clear()
+    execution.nodes_can_run.cache_clear()
 
 
 @pytest.fixture

@@ -15,9 +15,8 @@ from hypothesis.extra import numpy as arrays
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import Driver, Reading
-from afm_scan_ros.drivers.guarded import GuardedDriver
+from afm_scan_ros.drivers.guarded import GuardedDriver, checked
 from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.drivers.readings import checked
 from helpers.stage import settings
 
 FIRST, PERIOD = 40, 1e-4

@@ -13,11 +13,9 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import (
-    FORMER_KINDS,
     AddedEffect,
     added_from,
     added_to,
-    former_key,
     load_model,
     model_hash,
     save_model,
@@ -56,28 +54,6 @@ def test_a_model_with_an_effect_comes_back(name: str, kind: str, tmp_path: Path)
     (in_file,) = yaml.load(tmp_path / "extended.yaml")["y"]["added"]
     assert in_file["name"] == name
     assert [*in_file["parameters"]] == [p.name for p in effect_type(name).form(kind).parameters]
-
-
-@pytest.mark.parametrize(("name", "kind"), FORMS)
-def test_a_file_that_names_parameters_with_their_units_still_loads(name: str, kind: str) -> None:
-    form = effect_type(name).form(kind)
-    keys = [former_key(parameter) for parameter in form.parameters]
-    assert all(key.isidentifier() for key in keys)
-    former = AddedEffect(name, kind, dict(zip(keys, form.example, strict=True)))
-    assert added_from([former], Scale()) == (Added(name, kind, form.example),)
-
-
-def test_a_file_of_before_gives_the_values_by_name_and_unit() -> None:
-    former = AddedEffect("drift", "", {"rate_m_per_s": 1e-8, "settling_s": 20.0})
-    assert added_from([former], Scale()) == (Added("drift", "", (1e-8, 20.0)),)
-
-
-@pytest.mark.parametrize(("name", "kind"), FORMER_KINDS)
-def test_a_former_kind_still_loads(name: str, kind: str) -> None:
-    form = effect_type(name).form(FORMER_KINDS[name, kind])
-    (now,) = added_to([Added(name, form.kind, form.example)])
-    (found,) = added_from([evolve(now, kind=kind)], Scale())
-    assert found == Added(name, form.kind, form.example)
 
 
 def delay_of(value: object, unit: str = "s") -> dict[str, object]:

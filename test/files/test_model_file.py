@@ -177,7 +177,7 @@ def test_a_file_that_does_not_say_how_effects_are_known_has_identified_all(saved
     content = yaml.load(saved)
     for axis in ("x", "y"):
         del content[axis]["effects"]
-    yaml.save(saved, content, "an earlier model")
+    yaml.save(saved, content, "a model")
     assert load_model(saved).x.effects == BaseEffects()
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from afm_scan_ros.cli.run import run
+from afm_scan_ros.cli.main import run
 from afm_scan_ros.nodes import NODES
 
 LIST = Path(__file__).parents[2] / "resource/executables.txt"

@@ -9,7 +9,7 @@ import pytest
 from afm_scan_ros.bag.mcap_file import messages
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.typestore import decode
-from afm_scan_ros.cli import ways
+from afm_scan_ros.cli import execution
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
@@ -52,7 +52,7 @@ def test_a_scan_is_the_same_to_the_bit(tmp_path: Path, *, corrected: bool) -> No
     spec.write_text(SPEC, "utf-8")
     for nodes in (True, False):
         files = ScanFiles(spec, CONFIG / "model.yaml", plant, tmp_path / f"nodes_{nodes}")
-        with mock.patch.object(ways, "nodes_can_run", lambda nodes=nodes: nodes):
+        with mock.patch.object(execution, "nodes_can_run", lambda nodes=nodes: nodes):
             run_scan(files, INVERSES, watched=True, line_feedback=corrected, adapt=corrected)
     by_nodes, alone = (sent(tmp_path / f"nodes_{nodes}") for nodes in (True, False))
     assert by_nodes.keys() == alone.keys() > EQUAL
@@ -66,7 +66,7 @@ def test_a_scan_is_the_same_to_the_bit(tmp_path: Path, *, corrected: bool) -> No
 def test_a_record_is_the_same_to_the_bit(tmp_path: Path) -> None:
     plan = EXPERIMENTS["rest"].plan()
     for nodes in (True, False):
-        with mock.patch.object(ways, "nodes_can_run", lambda nodes=nodes: nodes):
+        with mock.patch.object(execution, "nodes_can_run", lambda nodes=nodes: nodes):
             DrivenScanner(seed=3).record(plan, tmp_path / f"nodes_{nodes}", "rest")
     one, other = (read_scan(tmp_path / f"nodes_{nodes}") for nodes in (True, False))
     assert set(one.topics) == set(other.topics)

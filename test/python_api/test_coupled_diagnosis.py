@@ -177,7 +177,3 @@ def test_records_that_tell_nothing_are_refused() -> None:
     ):
         with pytest.raises(afm.InputError, match=says):
             afm.diagnose(model, given)
-    errors = tuple(evolve(error, by_band=()) for error in model.coupled.errors)
-    former = afm.Model(evolve(model.coupled, errors=errors), "an older file")
-    with pytest.raises(afm.InputError, match="states no error by band: identify it again"):
-        afm.diagnose(former, records)

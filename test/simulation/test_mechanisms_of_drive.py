@@ -13,7 +13,7 @@ from afm_scan_ros.simulation.mechanisms.amplifier import (
     LimitedAmplifier,
 )
 from afm_scan_ros.simulation.mechanisms.base import Insert
-from afm_scan_ros.simulation.mechanisms.hysteresis import ViscousBlocks
+from afm_scan_ros.simulation.mechanisms.material import ViscousBlocks
 from afm_scan_ros.simulation.scanner import PlantSpec
 
 STEP = 5e-6

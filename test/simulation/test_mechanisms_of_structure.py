@@ -6,8 +6,7 @@ from scipy import linalg
 
 from afm_scan_ros.simulation.axis import Dynamics, first_resonance, series
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage, SprungBody
-from afm_scan_ros.simulation.mechanisms.creep import AgedCreep
-from afm_scan_ros.simulation.mechanisms.hysteresis import LostPoling
+from afm_scan_ros.simulation.mechanisms.material import AgedCreep, LostPoling
 from afm_scan_ros.simulation.mechanisms.structure import (
     CoupledStage,
     HeavierLoad,

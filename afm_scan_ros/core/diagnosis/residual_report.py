@@ -9,7 +9,7 @@ from numpy.polynomial.legendre import legfit, legval
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import UNEXPLAINED, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.description import (
     Coherence,
     Correlation,
@@ -25,7 +25,6 @@ from afm_scan_ros.core.diagnosis.description import (
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.records import AxisSignals, InitialState
-from afm_scan_ros.core.diagnosis.suggestion import Suggestion, suggest
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array
@@ -127,18 +126,16 @@ def _lines(residual: Array, sample_period: float) -> tuple[tuple[float, float], 
 class ResidualReport:
     """A diagnosis with its residuals described, one description a record on each axis.
 
-    ``before`` is of the model, ``after`` of the extended one. ``suggestions`` are of axes that
-    stay unexplained.
+    ``before`` is of the model, ``after`` of the extended one.
     """
 
     diagnosis: ScannerDiagnosis
     before: dict[str, tuple[Description, ...]]
     after: dict[str, tuple[Description, ...]]
-    suggestions: tuple[Suggestion, ...]
 
 
 def report_residual(diagnosis: ScannerDiagnosis) -> ResidualReport:
-    """Describe the residuals of the diagnosed records; suggest equations where unexplained."""
+    """Describe the residuals of the diagnosed records before and after the diagnosis."""
     by_axis = diagnosis.by_axis
     before = {
         axis: _described(diagnosed, diagnosed.chain, diagnosis)
@@ -150,12 +147,7 @@ def report_residual(diagnosis: ScannerDiagnosis) -> ResidualReport:
         else _described(diagnosed, diagnosed.final, diagnosis)
         for axis, diagnosed in by_axis.items()
     }
-    unexplained = [diagnosed for diagnosed in by_axis.values() if diagnosed.verdict == UNEXPLAINED]
-    offered = [
-        suggest(diagnosed.axis, diagnosed.evidence, diagnosed.chain) for diagnosed in unexplained
-    ]
-    found = tuple(each for each in offered if each)
-    return ResidualReport(diagnosis, before, after, found)
+    return ResidualReport(diagnosis, before, after)
 
 
 def most_excited_record(diagnosed: AxisDiagnosis) -> int:

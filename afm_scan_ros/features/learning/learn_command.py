@@ -5,23 +5,15 @@ from pathlib import Path
 
 import click
 
+from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
 from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import drive_limits_of
-from afm_scan_ros.cli.scanner import scanner_options, seed_option, time_scale_option
-from afm_scan_ros.cli.session import RecordedSession
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.features.learning.loop import (
-    FEWEST,
-    SCANS,
-    LearningScan,
-    best_of,
-    lacking,
-    observations,
-)
+from afm_scan_ros.features.learning import loop
 from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.features.learning.report import (
     Taught,
@@ -46,11 +38,11 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan that is repeated.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
-@scanner_options
+@driven_options
 @click.option(
     "--scans",
-    type=click.IntRange(min=FEWEST),
-    default=SCANS,
+    type=click.IntRange(min=loop.FEWEST),
+    default=loop.SCANS,
     show_default=True,
     help="Number of scans; the first two have no correction.",
 )
@@ -60,19 +52,8 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
-@seed_option
-@time_scale_option
-def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    spec: Path,
-    model: Path,
-    plant: Path,
-    scanner: str,
-    scans: int,
-    out: Path,
-    seed: int,
-    time_scale: float | None,
-    *,
-    diagnosed: bool,
+def learn(
+    spec: Path, model: Path, driven: DrivenScanner, scans: int, out: Path, *, diagnosed: bool
 ) -> None:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
@@ -83,10 +64,10 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     for axis in AXES:
         base.axis(axis)
     wanted, _ = load_scan(spec, [parameter.name for parameter in FLOW])
-    limits = drive_limits_of(scanner, plant)
+    limits = drive_limits_of(driven.scanner, driven.plant)
     refuse_existing(out / "bags")
-    session = RecordedSession(plant, out, seed, scanner, time_scale)
-    done: list[LearningScan] = []
+    session = RecordedSession(driven, out)
+    done: list[loop.LearningScan] = []
     failure, ended = "", None
     try:
         for each in learning_scans(session, base, wanted, scans, limits):
@@ -99,7 +80,7 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         ended = error
         failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
-    save_learned(out / "learned.npz", best_of(done).correction, base)
+    save_learned(out / "learned.npz", loop.best_of(done).correction, base)
     _write(out, done, None, made, failure)
     show(learning_text(done))
     if diagnosed and not failure:
@@ -113,18 +94,20 @@ def learn(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         raise ScanError(f"learning ended after {len(done)} scans: {failure}")
 
 
-def _taught(model: ScannerModel, done: list[LearningScan], out: Path, of: Provenance) -> Taught:
+def _taught(
+    model: ScannerModel, done: list[loop.LearningScan], out: Path, of: Provenance
+) -> Taught:
     """Diagnose the first scan and the learned one together."""
     with working("diagnosing") as progress:
-        found = diagnose(model, observations(done), progress)
-    best = best_of(done)
+        found = diagnose(model, loop.observations(done), progress)
+    best = loop.best_of(done)
     head = f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", found.model, head)
-    return Taught(found, lacking(model, best), lacking(found.model, best))
+    return Taught(found, loop.lacking(model, best), loop.lacking(found.model, best))
 
 
 def _write(
-    out: Path, done: list[LearningScan], taught: Taught | None, of: Provenance, failure: str
+    out: Path, done: list[loop.LearningScan], taught: Taught | None, of: Provenance, failure: str
 ) -> None:
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}

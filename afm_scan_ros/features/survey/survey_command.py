@@ -5,18 +5,17 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
 from re import Pattern
-from typing import Any
 
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.bag.collection import FoundBag, found_bags, instrument_of
-from afm_scan_ros.cli.options import FOLDER, RECORD, positive, working
+from afm_scan_ros.cli.options import FOLDER, RECORD, grouped, positive, working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag
+from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
 from afm_scan_ros.features.survey.changes import changes
 from afm_scan_ros.features.survey.folder import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.features.survey.page import Survey, alert, page, summary
@@ -55,29 +54,23 @@ class WatchOptions:
         return self.until is None or count < self.until
 
 
-def watch_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add options of watching to a command, which gets them as ``watching``."""
+def _watching(every: float, until: int | None, *, watch: bool) -> WatchOptions | None:
+    return WatchOptions(every, until) if watch else None
 
-    @click.option("--watch", is_flag=True, help="Keep looking for new bags that are complete.")
-    @click.option(
+
+watch_options = grouped(
+    "watching",
+    _watching,
+    click.option("--watch", is_flag=True, help="Keep looking for new bags that are complete."),
+    click.option(
         "--every",
         type=positive("s"),
         default="60s",
         show_default=True,
         help="Time between looks, with --watch.",
-    )
-    @click.option("--until", type=click.IntRange(1), help="Recordings at which --watch ends.")
-    @wraps(command)
-    def with_watch(
-        every: float,
-        until: int | None,
-        *,
-        watch: bool,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        command(watching=WatchOptions(every, until) if watch else None, **options)
-
-    return with_watch
+    ),
+    click.option("--until", type=click.IntRange(1), help="Recordings at which --watch ends."),
+)
 
 
 @frozen

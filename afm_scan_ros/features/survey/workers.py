@@ -11,14 +11,15 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from ctypes import CDLL
-from functools import cache, partial, wraps
+from functools import cache, partial
 from importlib.util import find_spec
 from multiprocessing import get_context, parent_process
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import click
 from attrs import frozen
 
+from afm_scan_ros.cli.options import grouped
 from afm_scan_ros.core.errors import InputError, ScanError
 
 Task = TypeVar("Task")
@@ -49,25 +50,21 @@ class WorkerOptions:
         return on_cluster(work, tasks, self.scheduler)
 
 
-def worker_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add options of workers to a command, which gets them as ``workers``."""
+def _workers(jobs: int | None, scheduler: str | None) -> WorkerOptions:
+    if scheduler is not None and find_spec("distributed") is None:
+        raise InputError(
+            "--scheduler needs dask.distributed, which is not installed:"
+            " pip install 'afm_scan_ros[dask]'"
+        )
+    return WorkerOptions(jobs or os.cpu_count() or 1, scheduler)
 
-    @click.option("--jobs", type=click.IntRange(1), help="Processes, by default one for each core.")
-    @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers are used.")
-    @wraps(command)
-    def with_workers(
-        jobs: int | None,
-        scheduler: str | None,
-        **options: Any,  # noqa: ANN401 - the command's own
-    ) -> None:
-        if scheduler is not None and find_spec("distributed") is None:
-            raise InputError(
-                "--scheduler needs dask.distributed, which is not installed:"
-                " pip install 'afm_scan_ros[dask]'"
-            )
-        command(workers=WorkerOptions(jobs or os.cpu_count() or 1, scheduler), **options)
 
-    return with_workers
+worker_options = grouped(
+    "workers",
+    _workers,
+    click.option("--jobs", type=click.IntRange(1), help="Processes, by default one for each core."),
+    click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers are used."),
+)
 
 
 def in_processes(

@@ -4,10 +4,9 @@ from importlib.metadata import entry_points
 
 from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a module registers its kinds
     amplifier,
-    creep,
     elapsed,
     environment,
-    hysteresis,
+    material,
     sensor,
     structure,
 )

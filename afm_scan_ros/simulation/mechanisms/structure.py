@@ -9,18 +9,12 @@ from attrs.validators import ge, gt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import AxisSpec, detuned_axis, quantity
-from afm_scan_ros.simulation.mechanisms.attachment import (
-    AttachedStage,
-    Attachment,
-    Parts,
-    SprungBody,
-    YieldingAttachment,
-)
+from afm_scan_ros.simulation.mechanisms import attachment
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Insert
 
 
 @frozen(kw_only=True)
-class RidingMass(Attachment):
+class RidingMass(attachment.Attachment):
     """A small mass on a leaf spring on the stage: a second bending mode.
 
         m q'' + c (q' - x') + k (q - x) = 0,    the stage feels k (q - x) + c (q' - x')
@@ -35,15 +29,15 @@ class RidingMass(Attachment):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     damping: float = quantity(gt(0.0))
 
-    def attached(self, stage: AttachedStage) -> SprungBody:
+    def attached(self, stage: attachment.AttachedStage) -> attachment.SprungBody:
         """Mass on the axis alone, its spring as stiff as mass and frequency make it."""
         natural = 2.0 * np.pi * self.frequency
         stiffness = self.mass_ratio * (natural / stage.natural) ** 2
-        return SprungBody(self.row, stage, natural, self.damping, (1.0, 0.0), stiffness)
+        return attachment.SprungBody(self.row, stage, natural, self.damping, (1.0, 0.0), stiffness)
 
 
 @frozen(kw_only=True)
-class CoupledStage(Attachment):
+class CoupledStage(attachment.Attachment):
     """A flexure between the two axes: the other axis pulls at this one through the flexure's mass.
 
         m q'' + c r' + k r = 0,  r = q - (x + y) / 2;    x feels k s + c s',  s = q - x / 2
@@ -60,15 +54,17 @@ class CoupledStage(Attachment):
     frequency: float = quantity(gt(0.0), suffix="_hz")
     damping: float = quantity(gt(0.0))
 
-    def attached(self, stage: AttachedStage) -> SprungBody:
+    def attached(self, stage: attachment.AttachedStage) -> attachment.SprungBody:
         """The coupling mode, half on either axis."""
         natural = 2.0 * np.pi * self.frequency
         halves = (0.5, 0.5)
-        return SprungBody(self.row, stage, natural, self.damping, halves, 2.0 * self.share)
+        return attachment.SprungBody(
+            self.row, stage, natural, self.damping, halves, 2.0 * self.share
+        )
 
 
 @frozen(eq=False)
-class YieldingSprings(Parts):
+class YieldingSprings(attachment.Parts):
     """Springs of ``share`` (1) altogether, which yield at ``reaches`` (m)."""
 
     def integrate(self, state: Array, path: Array, step: float) -> Array:
@@ -78,7 +74,7 @@ class YieldingSprings(Parts):
 
 
 @frozen(kw_only=True)
-class YieldingTube(YieldingAttachment):
+class YieldingTube(attachment.YieldingAttachment):
     """A tube whose stiffness falls, and whose losses grow, with the deflection.
 
         s_i' = x' (1 - (s_i / reach_i)^2 [x' s_i > 0])
@@ -91,7 +87,7 @@ class YieldingTube(YieldingAttachment):
     """
 
     KIND: ClassVar[str] = "yielding_tube"
-    PARTS: ClassVar[type[Parts]] = YieldingSprings
+    PARTS: ClassVar[type[attachment.Parts]] = YieldingSprings
 
 
 @compiled

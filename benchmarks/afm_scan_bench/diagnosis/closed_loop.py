@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
+from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession
 from afm_scan_ros.cli.options import working
-from afm_scan_ros.cli.session import RecordedSession
 from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
@@ -61,7 +61,8 @@ def measure(plants: Sequence[str] = PLANTS) -> Table:
 
 
 def _row(plant: str, folder: Path, announce: Callable[[str], None]) -> Row:
-    session = RecordedSession(share_directory() / f"config/{plant}.yaml", folder, SEED)
+    scanner = DrivenScanner(plant=share_directory() / f"config/{plant}.yaml", seed=SEED)
+    session = RecordedSession(scanner, folder)
     trace = partial(diagnose, progress=lambda doing: announce(f"{plant}: {doing}"))
     announce(plant)
     rounds = list(close_loop(session, default_model(), validation_specs(SPEC), ROUNDS, trace))

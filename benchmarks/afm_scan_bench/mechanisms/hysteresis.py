@@ -10,7 +10,7 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import AxisSpec, PlayBank, quantity
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Blocks, Insert, Place
-from afm_scan_ros.simulation.mechanisms.hysteresis import DraggedBank
+from afm_scan_ros.simulation.mechanisms.material import DraggedBank
 
 
 @frozen(kw_only=True)

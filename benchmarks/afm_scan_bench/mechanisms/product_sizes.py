@@ -9,9 +9,8 @@ from attrs import frozen
 
 from afm_scan_ros.simulation.mechanisms import (
     amplifier,
-    creep,
     environment,
-    hysteresis,
+    material,
     sensor,
     structure,
 )
@@ -61,7 +60,7 @@ def _floor(amplitudes: Sizes, **same: object) -> SizedEffect:
 
 
 def _creeping(shares: Sizes, taus: tuple[float, ...]) -> SizedEffect:
-    return _of("slow_creep", creep.CreepingMount, "share", shares, taus=taus)
+    return _of("slow_creep", material.CreepingMount, "share", shares, taus=taus)
 
 
 EFFECTS = {
@@ -92,7 +91,7 @@ EFFECTS = {
     "delay": _of("delay", amplifier.DelayedConverter, "delay", (17e-6, 50e-6, 170e-6)),
     "rate_dependent_hysteresis": _of(
         "rate_dependent_hysteresis",
-        hysteresis.ViscousBlocks,
+        material.ViscousBlocks,
         "time_constant",
         (30e-6, 90e-6, 300e-6),
     ),
@@ -130,9 +129,9 @@ EFFECTS = {
     "parameter_shift_resonance": _of(
         "parameter_shift", structure.HeavierLoad, "mass_ratio", (0.04, 0.12, 0.4)
     ),
-    "parameter_shift_creep": _of("parameter_shift", creep.AgedCreep, "factor", (1.7, 3.0, 7.0)),
+    "parameter_shift_creep": _of("parameter_shift", material.AgedCreep, "factor", (1.7, 3.0, 7.0)),
     "parameter_shift_gain": _of(
-        "parameter_shift", hysteresis.LostPoling, "loss", (0.0033, 0.01, 0.033)
+        "parameter_shift", material.LostPoling, "loss", (0.0033, 0.01, 0.033)
     ),
     "cyclic_error": _of(None, sensor.CyclicEncoder, "inequality", (0.044, 0.13, 0.42), period=8e-6),
     "bow": _of(None, structure.ScannerBow, "arm", (4e-3, 1.3e-3, 0.4e-3)),

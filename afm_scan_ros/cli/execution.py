@@ -1,20 +1,14 @@
-"""A scan or a record in this process, where there is no ROS."""
+"""Executes what is ordered: by nodes where there is ROS, in this process elsewhere."""
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import click
 from attrs import evolve
 
-from afm_scan_ros.cli.orders import (
-    COMPENSATOR,
-    MONITOR,
-    Parameters,
-    RecordOrder,
-    ScanOrder,
-    settings_of,
-)
+from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
 from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
@@ -27,6 +21,7 @@ from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.nodes import has_rclpy, lacking_ros
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
 from afm_scan_ros.nodes.parameters import (
     ADAPTATION,
@@ -40,11 +35,40 @@ from afm_scan_ros.nodes.parameters import (
 from afm_scan_ros.pipeline import ScanChain, run
 
 
-def scan(order: ScanOrder) -> None:
+def execute_scan(order: orders.ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
+    if nodes_can_run():
+        from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
+
+        by_nodes.scan(order)
+    else:
+        _scan(order)
+
+
+def execute_record(order: orders.RecordOrder) -> None:
+    """Drive the scanner through a plan; raises as ``execute_scan`` does."""
+    if nodes_can_run():
+        from afm_scan_ros.cli import by_nodes  # noqa: PLC0415 - needs ROS
+
+        by_nodes.record(order)
+    else:
+        _record(order)
+
+
+@cache
+def nodes_can_run() -> bool:
+    """Return whether nodes can run; a ROS without this package's messages is told of once."""
+    lacking = lacking_ros()
+    if lacking and has_rclpy():
+        click.echo(f"afm-scan: {lacking}; all runs in this process instead", err=True)
+    return not lacking
+
+
+def _scan(order: orders.ScanOrder) -> None:
+    """Scan in this process."""
     files, spec = order.files, order.spec
     flow = _flow({**order.flow, **order.scanner.source}, str(files.spec))
-    own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
+    own = orders.settings_of(orders.COMPENSATOR, INVERSION, order.own.get(orders.COMPENSATOR, {}))
     given = inversion_settings({**own, "inverses": order.inverses})
     info = evolve(
         info_of_scan(spec, *identity(flow["scan_id"])),
@@ -67,8 +91,8 @@ def scan(order: ScanOrder) -> None:
         run(chain, files.bag, shown)
 
 
-def record(order: RecordOrder) -> None:
-    """Drive the scanner through a plan; raises as ``scan`` does."""
+def _record(order: orders.RecordOrder) -> None:
+    """Drive the scanner through a plan in this process."""
     plan, flow = order.plan, _flow(order.scanner.source, order.plan.name)
     info = ScanInfo(*identity(""), plan.name, plan.sample_period, plan.total_samples)
     chain = ScanChain(
@@ -99,17 +123,19 @@ def _flowing(info: ScanInfo, flow: Mapping[str, Any]) -> dict[str, Any]:
     return {"info": info, "block_size": size}
 
 
-def _driver(scanner: ScannerChoice, own: Parameters) -> DriverChoice:
+def _driver(scanner: ScannerChoice, own: orders.Parameters) -> DriverChoice:
     given = {**scanner.parameters, **own}
     if scanner.node == SIM_NODE:
-        return simulated_scanner(settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
+        return simulated_scanner(orders.settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
     return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
 
 
-def _monitor(order: ScanOrder) -> ScanMonitor | None:
+def _monitor(order: orders.ScanOrder) -> ScanMonitor | None:
     if not order.watched:
         return None
-    given = settings_of(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
+    given = orders.settings_of(
+        orders.MONITOR, (*ALARMS, *ADAPTATION), order.own.get(orders.MONITOR, {})
+    )
     adaptation = None
     if given["adapt"]:
         adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])
