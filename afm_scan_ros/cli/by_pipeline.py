@@ -28,15 +28,13 @@ from afm_scan_ros.drivers import DriverChoice, load_settings
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
-from afm_scan_ros.nodes.parameters import (
+from afm_scan_ros.nodes.inversion_parameters import (
     ADAPTATION,
     ALARMS,
     INVERSION,
-    SIMULATION,
-    checked,
     inversion_settings,
-    simulated_scanner,
 )
+from afm_scan_ros.nodes.parameters import SIMULATION, checked, simulated_scanner
 from afm_scan_ros.pipeline import ScanChain, run
 
 

@@ -12,8 +12,9 @@ from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
+from afm_scan_ros.nodes.inversion_parameters import ADAPTATION, ALARMS
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import ADAPTATION, ALARMS, MODEL_FILE, model_of
+from afm_scan_ros.nodes.parameters import MODEL_FILE, model_of
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
