@@ -118,7 +118,7 @@ def _inversion(order: ScanOrder) -> ScanInversion:
     """Return the scan's inversion, by the model alone."""
     own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
     given = inversion_settings({**own, "inverses": order.inverses})
-    given = evolve(given, line_feedback=False, adapt=False)
+    given = evolve(given, corrections=())
     return ScanInversion(order.model, order.spec, given)
 
 

@@ -18,10 +18,7 @@ from afm_scan_ros.cli.orders import (
 )
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
-from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings
@@ -29,10 +26,10 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
 from afm_scan_ros.nodes.inversion_parameters import (
-    ADAPTATION,
-    ALARMS,
     INVERSION,
+    MONITORING,
     inversion_settings,
+    scan_monitor,
 )
 from afm_scan_ros.nodes.parameters import SIMULATION, checked, simulated_scanner
 from afm_scan_ros.pipeline import ScanChain, run
@@ -50,6 +47,10 @@ def scan(order: ScanOrder) -> None:
         model_hash=model_hash(order.model),
     )
     learned = load_learned(files.learned).correction if files.learned else None
+    monitor = None
+    if order.watched:
+        watched = settings_of(MONITOR, MONITORING, order.own.get(MONITOR, {}))
+        monitor = scan_monitor(order.model, spec, watched)
     chain = ScanChain(
         block=partial(desired, spec),
         driver=_driver(order.scanner, order.own.get(order.scanner.node, {})),
@@ -58,7 +59,7 @@ def scan(order: ScanOrder) -> None:
         time_scale=order.time_scale,
         inversion=ScanInversion(order.model, spec, given, learned),
         preflight=min(info.total_samples, own["preflight_samples"]),
-        monitor=_monitor(order),
+        monitor=monitor,
         **_flowing(info, flow),
     )
     with showing(f"scan to {files.bag}") as shown:
@@ -102,14 +103,3 @@ def _driver(scanner: ScannerChoice, own: Parameters) -> DriverChoice:
     if scanner.node == SIM_NODE:
         return simulated_scanner(settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
     return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
-
-
-def _monitor(order: ScanOrder) -> ScanMonitor | None:
-    if not order.watched:
-        return None
-    given = settings_of(MONITOR, (*ALARMS, *ADAPTATION), order.own.get(MONITOR, {}))
-    adaptation = None
-    if given["adapt"]:
-        adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])
-    watch = ResidualWatch(given["alarm"], given["alarm_lines"])
-    return ScanMonitor(order.model, order.spec, watch, adaptation)

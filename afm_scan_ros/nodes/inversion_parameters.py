@@ -1,14 +1,19 @@
 """Parameters of the nodes that invert and monitor a scan, and what is made of their values."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
-from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
+from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES, ResidualWatch
+from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
-from afm_scan_ros.core.model import INVERSES, InverseSettings
+from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.line_feedback import LEAD
-from afm_scan_ros.core.scan_inversion import InversionSettings
+from afm_scan_ros.core.online.adaptation import Adaptation
+from afm_scan_ros.core.online.adapted_scan import adapted_scan
+from afm_scan_ros.core.online.line_feedback import fed_back
+from afm_scan_ros.core.scan_inversion import LATENCY, InversionSettings, MakeCorrection
+from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits, inverses_of
 
 ADAPTATION = (
@@ -61,14 +66,14 @@ INVERSION = (
     ),
     NodeParameter(
         "feedback_latency_ms",
-        LEAD * 1e3,
+        LATENCY * 1e3,
         "With line_feedback or adapt: longest time from a sample's drive to its reading",
         low=0.0,
         high=10_000.0,
     ),
     *ADAPTATION,
 )
-ALARMS = (
+MONITORING = (
     NodeParameter(
         "alarm",
         ALARM_RATIO,
@@ -76,12 +81,18 @@ ALARMS = (
         low=1.0,
     ),
     NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
+    *ADAPTATION,
 )
 
 
 def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
     """Return how a scan is inverted by the parameters ``INVERSION``; refuses limits of zero."""
     given = settings
+    corrections: list[MakeCorrection] = []
+    if given["line_feedback"]:
+        corrections.append(fed_back)
+    if given["adapt"]:
+        corrections.append(partial(adapted_scan, given["adapt_time_constant_s"]))
     return InversionSettings(
         inverses_of(given["inverses"], INVERSES),
         drive_limits(given),
@@ -90,11 +101,18 @@ def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
             weight=_weight(given["weight_corner_hz"], given["weight_order"]),
             preview=given["preview_ms"] * 1e-3 or None,
         ),
-        line_feedback=given["line_feedback"],
-        adapt=given["adapt"],
+        corrections=tuple(corrections),
         latency=given["feedback_latency_ms"] * 1e-3,
-        time_constant=given["adapt_time_constant_s"],
     )
+
+
+def scan_monitor(model: ScannerModel, spec: ScanSpec, settings: Mapping[str, Any]) -> ScanMonitor:
+    """Return what monitors a scan by the parameters ``MONITORING``; raises as it does."""
+    trackers = []
+    if settings["adapt"]:
+        trackers.append(Adaptation(model, spec, settings["adapt_time_constant_s"]).news)
+    watch = ResidualWatch(settings["alarm"], settings["alarm_lines"])
+    return ScanMonitor(model, spec, watch, trackers)
 
 
 def _weight(corner: float, order: int) -> Weight | RelativeWeight:

@@ -13,18 +13,16 @@ extrapolated to the line that is corrected next (extrapolation.py), whose correc
 negative. So what line k - delay showed, less what was corrected since, changes the correction.
 """
 
-from collections import deque
-from collections.abc import Iterator
-from math import ceil
-
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.online.extrapolation import Extrapolation, Known
+from afm_scan_ros.core.online.line_correction import LineCorrection, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import ACHIEVED, DESIRED, ErrorLines, end, part
-from afm_scan_ros.core.trajectory import TO_AND_FRO, desired, phases, sample_kinds, smooth_step
+from afm_scan_ros.core.streams import DRIVE, ErrorLines, end
+from afm_scan_ros.core.trajectory import TO_AND_FRO, desired, phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace
 
 OFFSET_X, TILT_X, GAIN_X, OFFSET_Y, TILT_Y = range(5)
@@ -32,26 +30,6 @@ OFFSET_X, TILT_X, GAIN_X, OFFSET_Y, TILT_Y = range(5)
 COEFFICIENTS = 5
 CENTRE_X, CENTRE_Y = 0.5, 0.25
 """Middle of what is fitted, in lines from a line's start."""
-LEAD = 0.04
-"""Seconds from a sample's drive to its reading: two blocks at 50 blocks a second."""
-ROUNDING = 1e-9
-"""Of a number of lines."""
-
-
-def lines_of_delay(spec: ScanSpec, held_back: int, latency: float = LEAD) -> int:
-    """Lines from one that is measured to the first that can be corrected by it, at least 1.
-
-    The drive is known ``held_back`` samples after the desired displacement, and a reading
-    ``latency`` s after its drive. The correction of a line begins in the turn-around before it, and
-    a line is measured when the first half of the turn-around after it is.
-    """
-    late = held_back + turn_samples(spec) + latency / spec.sample_period
-    return 1 + ceil(late / spec.samples_per_line - ROUNDING)
-
-
-def turn_samples(spec: ScanSpec) -> int:
-    """Samples of a turn-around on either side of the corner."""
-    return ceil(0.5 * spec.turnaround * (spec.samples_per_line // 2))
 
 
 class LineFit:
@@ -144,43 +122,47 @@ def _solver(basis: Array) -> Array:
     return np.asarray(np.linalg.pinv(basis.T), dtype=np.float64)
 
 
-class CorrectedLines:
-    """Adds the corrections of lines to the desired displacement.
+class FedBack(LineCorrection):
+    """Adds the corrections of lines, which follow from the errors of those before, to a reference.
 
     On the constant-speed parts of a line its correction is ``offset + tilt t + gain x_d / range``.
-    In the turn-around before the line it is reached from that of the line before, by a smooth step
-    with continuous velocity and acceleration. After the last line its correction is held.
     """
 
-    def __init__(self, spec: ScanSpec) -> None:
-        self._lines, self._size = phases(spec).lines, spec.samples_per_line
-        self._turn = turn_samples(spec)
-        self._last = spec.lines - 1
-        self._range = spec.range_x
+    def __init__(self, spec: ScanSpec, law: LineFeedback) -> None:
+        super().__init__(spec, law.delay, np.zeros(COEFFICIENTS))
+        self.remark = (
+            f"line feedback: line k is corrected by lines up to k - {law.delay}; drifts"
+            f" slower than {law.bandwidth:.3g} Hz are reduced"
+        )
+        self._law, self._range = law, spec.range_x
+        self._errors = ErrorLines(phases(spec).lines, spec.samples_per_line)
+        self._state, self._latest = law.at_rest(), np.zeros(COEFFICIENTS)
 
-    def line_at(self, sample: int) -> int:
-        """Return the line whose correction a sample has, -1 before the first."""
-        line = (sample - self._lines.start + self._turn) // self._size
-        return max(-1, min(line, self._last))
+    def corrected_by(self) -> dict[str, float]:
+        """Return the offset (m) by which each axis is corrected in the last line that was begun."""
+        return {"x": float(self._latest[OFFSET_X]), "y": float(self._latest[OFFSET_Y])}
 
-    def part_of(self, line: int, block: Trace) -> Trace:
-        """Return the beginning of a block that has one line's correction."""
-        stop = end(block) if line == self._last else min(end(block), self.begins(line + 1))
-        return part(block, block.first_sample, stop)
+    def effect(self) -> str:
+        """Say by how much the last line that was begun is corrected."""
+        moved = self.corrected_by().items()
+        corrections = ", ".join(f"{axis} by {1e6 * offset:.3g} µm" for axis, offset in moved)
+        return f"line feedback corrects {corrections}"
 
-    def begins(self, line: int) -> int:
-        """First sample that depends on a line's correction: the turn-around before it begins."""
-        return self._lines.start + line * self._size - self._turn
+    def observe(self, name: str, block: Trace) -> None:
+        """Take the next block of a topic: the desired less the achieved displacement is learned."""
+        if name == DRIVE:
+            return
+        for line, error in self._errors.add(name, block):
+            self._state, ahead = self._law.learn(self._state, error)
+            self._values[line + self.delay] = ahead
 
-    def corrected(self, line: int, before: Array, now: Array, block: Trace) -> Trace:
-        """Return a block that has one line's correction throughout, corrected.
-
-        ``before`` and ``now`` are the corrections (5,), m, of the line before and of this one.
-        """
+    def _correct(self, line: int, before: Array, now: Array, block: Trace) -> Trace:
+        """Correct a block by the corrections (5,), m, of the line before and of this one."""
+        self._latest = now
         if line < 0:
             return block
         samples = np.arange(block.first_sample, end(block))
-        rise = smooth_step((samples - self.begins(line)) / (2.0 * self._turn))
+        rise = self._rise(line, block)
         time = (np.minimum(samples, self._lines.stop) - self._lines.start) / self._size - line
         shape = block.x / self._range
         old_x, old_y = _paths(before, time + 1.0, shape)
@@ -190,66 +172,9 @@ class CorrectedLines:
         return Trace(block.first_sample, block.sample_period, x, y)
 
 
-class FedBack:
-    """Takes what is desired and what was achieved, and yields the corrected desired displacement.
-
-    A block waits until the lines that its correction follows from were achieved. Blocks are cut
-    where a line's correction begins, so that the result depends neither on timing nor on how far
-    the scanner is ahead.
-    """
-
-    def __init__(self, spec: ScanSpec, law: LineFeedback) -> None:
-        self._law = law
-        self._place = CorrectedLines(spec)
-        self._errors = ErrorLines(phases(spec).lines, spec.samples_per_line)
-        self._waiting: deque[Trace] = deque()
-        self._state = law.at_rest()
-        self._line = -1
-        self._corrections = dict.fromkeys(range(-1, law.delay), np.zeros(COEFFICIENTS))
-
-    @property
-    def awaited(self) -> int | None:
-        """The line that must be achieved before more can be corrected; None where none must."""
-        if not self._waiting:
-            return None
-        line = self._place.line_at(self._waiting[0].first_sample)
-        return None if line in self._corrections else line - self._law.delay
-
-    def corrected_by(self) -> dict[str, float]:
-        """Return the offset (m) by which each axis is corrected in the last line that was begun."""
-        latest = self._corrections[self._line]
-        return {"x": float(latest[OFFSET_X]), "y": float(latest[OFFSET_Y])}
-
-    def desired(self, block: Trace, reference: Trace) -> Iterator[Trace]:
-        """Take the next block of the desired displacement, m; yield what can be corrected.
-
-        ``reference`` is what is to be followed in its place: the same without other corrections.
-        """
-        self._waiting.append(reference)
-        self._learn(DESIRED, block)
-        yield from self._corrected()
-
-    def achieved(self, block: Trace) -> Iterator[Trace]:
-        """Take the next block of the achieved displacement, m; yield what can be corrected."""
-        self._learn(ACHIEVED, block)
-        yield from self._corrected()
-
-    def _learn(self, name: str, block: Trace) -> None:
-        for line, error in self._errors.add(name, block):
-            self._state, ahead = self._law.learn(self._state, error)
-            self._corrections[line + self._law.delay] = ahead
-
-    def _corrected(self) -> Iterator[Trace]:
-        while self._waiting and self.awaited is None:
-            block = self._waiting.popleft()
-            line = self._place.line_at(block.first_sample)
-            now = self._place.part_of(line, block)
-            if end(now) < end(block):
-                self._waiting.appendleft(part(block, end(now), end(block)))
-            before = self._corrections[max(-1, line - 1)]
-            self._corrections.pop(line - 2, None)
-            self._line = line
-            yield self._place.corrected(line, before, self._corrections[line], now)
+def fed_back(_: ScannerModel, spec: ScanSpec, held_back: int, latency: float) -> FedBack:
+    """Return the line feedback of a scan; raises InputError for a scan that it does not suit."""
+    return FedBack(spec, LineFeedback(spec, lines_of_delay(spec, held_back, latency)))
 
 
 def _paths(correction: Array, time: Array, shape: Array) -> tuple[Array, Array]:

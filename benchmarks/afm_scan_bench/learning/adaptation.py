@@ -4,7 +4,6 @@ The load on x changes evenly over the scan. The scan is made in process, in bloc
 lines. What a block shows is in force from the next block but one on.
 """
 
-from collections import deque
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -18,7 +17,7 @@ from afm_scan_ros.core.online import TIME_CONSTANT
 from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.online.adapted_scan import AdaptedScan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import Aligner, end
+from afm_scan_ros.core.streams import ACHIEVED, DRIVE, Aligner, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table
@@ -77,7 +76,7 @@ def tracked(spec: ScanSpec, drift: float, *, adapt: bool, memory: float = TIME_C
     for first in range(0, where.total, size):
         target = desired(spec, first, min(size, where.total - first))
         held.add("target", target)
-        reference = _joined(adapted.desired(target)) if adapt else target
+        reference = _joined(adapted.corrected([target])) if adapt else target
         progress, drive = compensation.invert(progress, reference)
         drives = [drive]
         if end(target) == where.total:
@@ -86,8 +85,8 @@ def tracked(spec: ScanSpec, drift: float, *, adapt: bool, memory: float = TIME_C
             measured, true = scanner.advance(drive)
             held.add("true", true)
             if adapt:
-                adapted.driven(drive)
-                deque(adapted.achieved(measured), maxlen=0)  # no block waits for it
+                adapted.observe(DRIVE, drive)
+                adapted.observe(ACHIEVED, measured)  # no block waits for it
         meter.add(held)
         at = slice(max(0, (first - where.lines.start) // spec.samples_per_line), None)
         frequency[at] = adaptation.states["x"].shift.frequency

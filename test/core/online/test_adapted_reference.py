@@ -14,7 +14,7 @@ from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilte
 from afm_scan_ros.core.online.adapted_scan import AdaptedScan, refuse_without_turns
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import ACHIEVED, DRIVE, end, part
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 from helpers.in_process import FAST_SPEC, default_model
@@ -61,9 +61,10 @@ def adapted(shifts: dict[int, AxisShift], cuts: list[int]) -> Trace:
     edges = [0, *sorted(cuts), len(TARGET.x)]
     for start, stop in pairwise(edges):
         block = part(TARGET, start, stop)
-        parts += scan.desired(block)
-        scan.driven(block)
-        parts += scan.achieved(block)
+        parts += scan.corrected([block])
+        scan.observe(DRIVE, block)
+        scan.observe(ACHIEVED, block)
+        parts += scan.corrected()
     x, y = (np.concatenate([each.axis(name) for each in parts]) for name in AXES)
     return Trace(0, SPEC.sample_period, x, y)
 

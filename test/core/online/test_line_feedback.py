@@ -10,17 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.online.line_correction import lines_of_delay, turn_samples
 from afm_scan_ros.core.online.line_feedback import (
     CENTRE_X,
     CENTRE_Y,
     FedBack,
     LineFeedback,
     LineFit,
-    lines_of_delay,
-    turn_samples,
 )
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, end, part
 from afm_scan_ros.core.trajectory import (
     desired,
     phases,
@@ -61,12 +60,14 @@ class Chain:
 
     def follow(self, block: Trace, *, last: bool) -> None:
         """Follow a block as far as can be; all of it where it is the ``last``."""
-        pending = list(self.fed_back.desired(block, block))
+        self.fed_back.observe(DESIRED, block)
+        pending = list(self.fed_back.corrected([block]))
         while pending:
             self.followed.append(pending.pop(0))
             known = end(self.followed[-1]) - (0 if last and not pending else self._late)
             for achieved in self._achieved(known):
-                pending.extend(self.fed_back.achieved(achieved))
+                self.fed_back.observe(ACHIEVED, achieved)
+                pending.extend(self.fed_back.corrected())
         assert not last or self.fed_back.awaited is None
 
     def _achieved(self, known: int) -> list[Trace]:
