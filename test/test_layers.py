@@ -20,14 +20,14 @@ CORE_MODULES = [
 ABOVE = ("api", "cli", "pipeline", "report")  # what stands on all the others
 # Folder: what nothing in it imports.
 NEVER = {
-    "core": (*ABOVE, "bag", "drivers", "files", "nodes", "simulation"),
-    "simulation": (*ABOVE, "bag", "drivers", "files", "nodes"),
-    "files": (*ABOVE, "bag", "drivers", "nodes"),
-    "bag": (*ABOVE, "drivers", "nodes", "simulation"),
+    "core": (*ABOVE, "bag", "drivers", "features", "files", "nodes", "simulation"),
+    "simulation": (*ABOVE, "bag", "drivers", "features", "files", "nodes"),
+    "files": (*ABOVE, "bag", "drivers", "features", "nodes"),
+    "bag": (*ABOVE, "drivers", "features", "nodes", "simulation"),
     "drivers": (*ABOVE, "bag", "nodes"),
     "nodes": ABOVE,
-    "report": ("api", "cli", "pipeline"),
-    "api": ("cli", "nodes", "pipeline", "simulation"),
+    "report": ("api", "cli", "features", "pipeline"),
+    "api": ("cli", "features", "nodes", "pipeline", "simulation"),
 }
 FEATURES = sorted(
     path.name for path in (PACKAGE / "features").iterdir() if path.is_dir() and path.name[0] != "_"

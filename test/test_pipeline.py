@@ -17,9 +17,6 @@ from afm_scan_ros import pipeline
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import info_of_scan
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adapted_scan import adapted_scan
-from afm_scan_ros.core.online.line_feedback import fed_back
 from afm_scan_ros.core.scan_inversion import InversionSettings, OnlineCorrection, ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE
@@ -27,6 +24,9 @@ from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
+from afm_scan_ros.features.online.adaptation import TIME_CONSTANT
+from afm_scan_ros.features.online.adapted_scan import adapted_scan
+from afm_scan_ros.features.online.line_feedback import fed_back
 from afm_scan_ros.nodes.parameters import SIMULATION, simulated_scanner
 from afm_scan_ros.pipeline import ScanChain, run
 from afm_scan_ros.simulation.scanner import Piezoscanner

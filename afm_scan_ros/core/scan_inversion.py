@@ -74,11 +74,6 @@ class InversionSettings:
     corrections: tuple[MakeCorrection, ...] = ()
     latency: float = LATENCY
 
-    @property
-    def fed_back(self) -> bool:
-        """Whether the drive depends on what was achieved."""
-        return bool(self.corrections)
-
 
 class ScanInversion:
     """Takes the blocks of one scan, desired and achieved displacement (m); yields the drive (V).
@@ -195,14 +190,12 @@ class ScanInversion:
             self._progress, drive = self._compensation.invert(self._progress, block)
             owed = self._compensation.finish(self._progress) if last else None
         except ScanError as error:
-            raise ScanError("; ".join([str(error), *self._effects()])) from error
+            effects = filter(None, (each.effect() for each in self._corrections))
+            raise ScanError("; ".join([str(error), *effects])) from error
         if owed is None:
             return drive
         x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
         return Trace(drive.first_sample, drive.sample_period, x, y)
-
-    def _effects(self) -> list[str]:
-        return [effect for each in self._corrections if (effect := each.effect())]
 
 
 def _advice(ranges: Ranges) -> str:

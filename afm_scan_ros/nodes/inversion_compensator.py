@@ -43,7 +43,7 @@ class InversionCompensator(BlockConsumer):
         self._inversion: ScanInversion
         self._moved_at = 0.0
         self._given = inversion_settings(self.settings)
-        self.read([DESIRED, ACHIEVED] if self._given.fed_back else [DESIRED])
+        self.read([DESIRED, ACHIEVED] if self._given.corrections else [DESIRED])
         file = self.settings["learned_file"]
         with naming("parameter learned_file"):
             self._learned = load_learned(Path(file)) if file else None

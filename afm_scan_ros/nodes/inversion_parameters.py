@@ -1,31 +1,25 @@
 """Parameters of the nodes that invert and monitor a scan, and what is made of their values."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
+from afm_scan_ros import features
 from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES, ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import adapted_scan
-from afm_scan_ros.core.online.line_feedback import fed_back
-from afm_scan_ros.core.scan_inversion import LATENCY, InversionSettings, MakeCorrection
+from afm_scan_ros.core.scan_inversion import LATENCY, InversionSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.nodes.parameters import DRIVE_LIMITS, NodeParameter, drive_limits, inverses_of
-
-ADAPTATION = (
-    NodeParameter(
-        "adapt",
-        default=False,
-        description="Whether changes of gain, resonance and slow creep are tracked",
-    ),
-    NodeParameter(
-        "adapt_time_constant_s", TIME_CONSTANT, "With adapt: memory of the estimator", low=0.0
-    ),
+from afm_scan_ros.nodes.parameters import (
+    DRIVE_LIMITS,
+    NodeParameter,
+    OnlineOption,
+    drive_limits,
+    inverses_of,
 )
+
+ONLINE: Mapping[str, OnlineOption] = features.options()
+"""What features do while a scan runs, by its name."""
 
 _DEFAULT, _WEIGHT = InverseSettings(), RelativeWeight()
 INVERSION = (
@@ -60,18 +54,13 @@ INVERSION = (
         low=0,
     ),
     NodeParameter(
-        "line_feedback",
-        default=False,
-        description="Whether offset, tilt and gain are corrected from the last lines",
-    ),
-    NodeParameter(
         "feedback_latency_ms",
         LATENCY * 1e3,
-        "With line_feedback or adapt: longest time from a sample's drive to its reading",
+        f"With {' or '.join(ONLINE)}: longest time from a sample's drive to its reading",
         low=0.0,
         high=10_000.0,
     ),
-    *ADAPTATION,
+    *(parameter for each in ONLINE.values() for parameter in each.parameters),
 )
 MONITORING = (
     NodeParameter(
@@ -81,18 +70,13 @@ MONITORING = (
         low=1.0,
     ),
     NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
-    *ADAPTATION,
+    *(parameter for each in ONLINE.values() if each.tracker for parameter in each.parameters),
 )
 
 
 def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
     """Return how a scan is inverted by the parameters ``INVERSION``; refuses limits of zero."""
     given = settings
-    corrections: list[MakeCorrection] = []
-    if given["line_feedback"]:
-        corrections.append(fed_back)
-    if given["adapt"]:
-        corrections.append(partial(adapted_scan, given["adapt_time_constant_s"]))
     return InversionSettings(
         inverses_of(given["inverses"], INVERSES),
         drive_limits(given),
@@ -101,16 +85,18 @@ def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
             weight=_weight(given["weight_corner_hz"], given["weight_order"]),
             preview=given["preview_ms"] * 1e-3 or None,
         ),
-        corrections=tuple(corrections),
+        corrections=tuple(e.correction(given) for name, e in ONLINE.items() if given[name]),
         latency=given["feedback_latency_ms"] * 1e-3,
     )
 
 
 def scan_monitor(model: ScannerModel, spec: ScanSpec, settings: Mapping[str, Any]) -> ScanMonitor:
     """Return what monitors a scan by the parameters ``MONITORING``; raises as it does."""
-    trackers = []
-    if settings["adapt"]:
-        trackers.append(Adaptation(model, spec, settings["adapt_time_constant_s"]).news)
+    trackers = [
+        each.tracker(model, spec, settings)
+        for name, each in ONLINE.items()
+        if each.tracker and settings[name]
+    ]
     watch = ResidualWatch(settings["alarm"], settings["alarm_lines"])
     return ScanMonitor(model, spec, watch, trackers)
 

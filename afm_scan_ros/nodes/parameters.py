@@ -1,16 +1,18 @@
 """Parameters of the nodes: name, type, description, range; and what is made of their values."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
 
+from afm_scan_ros.core.diagnosis.scan_monitor import Tracker
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan_spec import human_name, scan_parameters
+from afm_scan_ros.core.scan_inversion import MakeCorrection
+from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
@@ -30,6 +32,22 @@ class NodeParameter:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+
+
+@frozen
+class OnlineOption:
+    """What a feature does while a scan runs, if the parameter and the option of its name say so.
+
+    ``help`` is that of the option. ``parameters`` are those of the compensator, and of the monitor
+    where there is a ``tracker``; ``correction`` and ``tracker`` are made by their values.
+    ``refuse_unsuited`` raises InputError for a scan that cannot be corrected so.
+    """
+
+    help: str
+    parameters: tuple[NodeParameter, ...]
+    refuse_unsuited: Callable[[ScanSpec], None]
+    correction: Callable[[Mapping[str, Any]], MakeCorrection]
+    tracker: Callable[[ScannerModel, ScanSpec, Mapping[str, Any]], Tracker] | None = None
 
 
 MODEL_FILE = NodeParameter(

@@ -13,13 +13,12 @@ from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, spec_at
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DRIVE, Aligner, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adaptation import TIME_CONSTANT, Adaptation
+from afm_scan_ros.features.online.adapted_scan import AdaptedScan
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad
 from afm_scan_ros.simulation.scanner import Piezoscanner

@@ -9,12 +9,12 @@ from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online.line_correction import lines_of_delay
-from afm_scan_ros.core.online.line_feedback import FedBack, LineFeedback
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, end
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.features.online.line_correction import lines_of_delay
+from afm_scan_ros.features.online.line_feedback import FedBack
 from afm_scan_ros.nodes.flow import block_size_at
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
@@ -36,7 +36,7 @@ def fed_back_scan(
     compensation = Compensation(default_model(), period, ALL, InverseSettings(), limits)
     chain = _Chain(compensation, Piezoscanner(plant, period, SEED, age), total)
     delay = lines_of_delay(spec, compensation.held_back)
-    fed_back = FedBack(spec, LineFeedback(spec, delay)) if corrects else None
+    fed_back = FedBack(spec, delay) if corrects else None
     size = block_size or block_size_at(period)
     for first in range(0, total, size):
         block = desired(spec, first, min(size, total - first))

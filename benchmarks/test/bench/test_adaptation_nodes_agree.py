@@ -15,11 +15,11 @@ from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
-from afm_scan_ros.core.online.line_correction import lines_of_delay
 from afm_scan_ros.core.streams import ACHIEVED, DRIVE, end, part
 from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.features.online.adaptation import Adaptation
+from afm_scan_ros.features.online.adapted_scan import AdaptedScan
+from afm_scan_ros.features.online.line_correction import lines_of_delay
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.scanner import Piezoscanner

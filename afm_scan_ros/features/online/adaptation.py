@@ -27,25 +27,26 @@ from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adapted_reference import AxisShift, room, slowest
-from afm_scan_ros.core.online.line_signals import (
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adapted_reference import AxisShift, room, slowest
+from afm_scan_ros.features.online.line_signals import (
     GAIN,
     HYSTERESIS,
     UNKNOWNS,
     LineSignals,
     ScanSignals,
 )
-from afm_scan_ros.core.online.shift_estimate import (
+from afm_scan_ros.features.online.shift_estimate import (
     CreepInformation,
     Information,
     LineInformation,
     ShiftEstimate,
     estimate,
 )
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array, Trace
 
+TIME_CONSTANT = 1.0
+"""Default memory, s."""
 FALSE_CHANGE = 0.01
 """Probability that a parameter of an unchanged scanner is changed in a scan."""
 PARAMETERS = ("gain", "frequency", "loss")

@@ -7,10 +7,11 @@ from math import ceil
 
 import numpy as np
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_inversion import LATENCY, OnlineCorrection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import end, part
-from afm_scan_ros.core.trajectory import phases, smooth_step
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases, smooth_step
 from afm_scan_ros.core.types import Array, Trace
 
 ROUNDING = 1e-9
@@ -31,6 +32,19 @@ def lines_of_delay(spec: ScanSpec, held_back: int, latency: float = LATENCY) -> 
 def turn_samples(spec: ScanSpec) -> int:
     """Samples of a turn-around on either side of the corner."""
     return ceil(0.5 * spec.turnaround * (spec.samples_per_line // 2))
+
+
+def refuse_unsuited(name: str, spec: ScanSpec) -> None:
+    """Raise InputError where a correction of this name cannot correct a scan line by line."""
+    if spec.pattern not in TO_AND_FRO:
+        raise InputError(
+            f"{name} corrects {' and '.join(TO_AND_FRO)} scans, not '{spec.pattern}': choose one of"
+            " these, or scan without it"
+        )
+    if not spec.turnaround:
+        raise InputError(
+            f"turnaround = 0 leaves {name} no time for its correction: give 0.1, or scan without it"
+        )
 
 
 class LineCorrection(OnlineCorrection):

@@ -1,28 +1,20 @@
 """The reference of a scan adapted to what earlier lines have shown to have changed."""
 
-from collections.abc import Iterator
-from typing import Protocol
-
 import numpy as np
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilter
-from afm_scan_ros.core.online.line_correction import LineCorrection, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, Aligner
-from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array, Trace
-
-
-class LineShifts(Protocol):
-    """Estimates the shift of each axis from line to line, as ``Adaptation`` does."""
-
-    def add(self, drive: Trace, measured: Trace) -> Iterator[tuple[int, dict[str, AxisShift]]]:
-        """Take the next run of samples; yield each line's number and shifts."""
-        ...
+from afm_scan_ros.features.online.adaptation import Adaptation
+from afm_scan_ros.features.online.adapted_reference import AxisShift, ReferenceFilter
+from afm_scan_ros.features.online.line_correction import (
+    LineCorrection,
+    lines_of_delay,
+    refuse_unsuited,
+)
 
 
 class AdaptedScan(LineCorrection):
@@ -32,9 +24,9 @@ class AdaptedScan(LineCorrection):
     """
 
     def __init__(
-        self, model: ScannerModel, spec: ScanSpec, adaptation: LineShifts, delay: int
+        self, model: ScannerModel, spec: ScanSpec, adaptation: Adaptation, delay: int
     ) -> None:
-        refuse_without_turns(spec)
+        refuse_unsuited("adaptation", spec)
         super().__init__(spec, delay, np.stack([AxisShift().weights] * len(AXES)))
         self._adaptation, self._aligner = adaptation, Aligner((DRIVE, ACHIEVED))
         period = spec.sample_period
@@ -78,17 +70,3 @@ def adapted_scan(
     """Return the adaptation of a scan, with a memory in s; raises InputError where it has none."""
     adaptation = Adaptation(model, spec, time_constant)
     return AdaptedScan(model, spec, adaptation, lines_of_delay(spec, held_back, latency))
-
-
-def refuse_without_turns(spec: ScanSpec) -> None:
-    """Raise InputError for a scan without turn-arounds, in which parameters could change."""
-    if spec.pattern not in TO_AND_FRO:
-        raise InputError(
-            f"adaptation is for {' and '.join(TO_AND_FRO)} scans, not '{spec.pattern}': choose"
-            " one of these, or scan without it"
-        )
-    if not spec.turnaround:
-        raise InputError(
-            "turnaround = 0 leaves adaptation no time to change its parameters: give 0.1, or"
-            " scan without it"
-        )
