@@ -21,14 +21,14 @@ PUBLIC = ("diagnosis", "identification", "model")  # modules of the public funct
 ABOVE = (*PUBLIC, "cli", "pipeline", "report")  # what stands on all the others
 # Folder: what nothing in it imports.
 NEVER = {
-    "core": (*ABOVE, "bag", "drivers", "files", "nodes", "simulation"),
-    "simulation": (*ABOVE, "bag", "drivers", "files", "nodes"),
-    "files": (*ABOVE, "bag", "drivers", "nodes"),
-    "bag": (*ABOVE, "drivers", "nodes", "simulation"),
+    "core": (*ABOVE, "bag", "drivers", "features", "files", "nodes", "simulation"),
+    "simulation": (*ABOVE, "bag", "drivers", "features", "files", "nodes"),
+    "files": (*ABOVE, "bag", "drivers", "features", "nodes"),
+    "bag": (*ABOVE, "drivers", "features", "nodes", "simulation"),
     "drivers": (*ABOVE, "bag", "nodes"),
     "nodes": ABOVE,
-    "report": (*PUBLIC, "cli", "pipeline"),
-    **dict.fromkeys(PUBLIC, ("cli", "nodes", "pipeline", "simulation")),
+    "report": (*PUBLIC, "cli", "features", "pipeline"),
+    **dict.fromkeys(PUBLIC, ("cli", "features", "nodes", "pipeline", "simulation")),
 }
 FEATURES = sorted(
     path.name for path in (PACKAGE / "features").iterdir() if path.is_dir() and path.name[0] != "_"

@@ -16,16 +16,17 @@ from hypothesis import strategies as st
 from afm_scan_ros import pipeline
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
-from afm_scan_ros.core.online.line_feedback import FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.scan_info import info_of_scan
-from afm_scan_ros.core.scan_inversion import InversionSettings, ScanInversion
+from afm_scan_ros.core.scan_inversion import InversionSettings, OnlineCorrection, ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import Displacement, GuardedDriver
+from afm_scan_ros.features.online.adaptation import TIME_CONSTANT
+from afm_scan_ros.features.online.adapted_scan import adapted_scan
+from afm_scan_ros.features.online.line_feedback import fed_back
 from afm_scan_ros.nodes.parameters import SIMULATION, simulated_scanner
 from afm_scan_ros.pipeline import ScanChain, run
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -33,6 +34,7 @@ from helpers.in_process import ALL, default_model, default_plant
 
 STREAMS = ("desired_displacement", "drive_voltage", "achieved_displacement", "true_displacement")
 LIMITS = default_plant().amplifier.limits
+ADAPTED = partial(adapted_scan, TIME_CONSTANT)
 CHOICE = simulated_scanner({each.name: each.default for each in SIMULATION}, "simulated")
 
 
@@ -74,21 +76,29 @@ class Unheard:
     def say(self, _: str) -> None: ...
 
 
+def through(corrections: list[OnlineCorrection], references: Iterable[Trace]) -> list[Trace]:
+    for each in corrections:
+        references = list(each.corrected(references))
+    return list(references)
+
+
 def plainly(spec: ScanSpec, size: int, given: InversionSettings) -> dict[str, list[Trace]]:
     """Return the blocks of each stream, one after the other, by the functions of core alone."""
     model, plant, period = default_model(), default_plant(), spec.sample_period
     compensation = Compensation(model, period, given.inverses, given.inverse, given.limits)
-    delay = lines_of_delay(spec, compensation.held_back, given.latency)
-    fed_back = FedBack(spec, LineFeedback(spec, delay)) if given.line_feedback else None
-    adapted = AdaptedScan(model, spec, Adaptation(model, spec), delay) if given.adapt else None
+    corrections = [
+        make(model, spec, compensation.held_back, given.latency) for make in given.corrections
+    ]
     scanner, progress = Piezoscanner(plant, period, 1), compensation.at_rest()
     done: dict[str, list[Trace]] = {name: [] for name in STREAMS}
     total = total_samples(spec)
 
-    def of(references: Iterable[Trace]) -> list[Trace]:
-        if adapted is None:
-            return list(references)
-        return [each for reference in references for each in adapted.desired(reference)]
+    def observed(name: str, block: Trace) -> list[Trace]:
+        found = []
+        for place, each in enumerate(corrections, 1):
+            each.observe(name, block)
+            found += through(corrections[place:], each.corrected())
+        return found
 
     def drive_of(block: Trace) -> Trace:
         nonlocal progress
@@ -102,18 +112,16 @@ def plainly(spec: ScanSpec, size: int, given: InversionSettings) -> dict[str, li
     for first in range(0, total, size):
         block = desired(spec, first, min(size, total - first))
         done[STREAMS[0]].append(block)
-        waiting = deque(of(fed_back.desired(block, block) if fed_back else [block]))
+        waiting = deque([*observed(DESIRED, block), *through(corrections, [block])])
         while waiting:
             drive = drive_of(waiting.popleft())
-            if adapted is not None:
-                adapted.driven(drive)
+            observed(DRIVE, drive)
             if not len(drive.x):
                 continue
             measured, true = scanner.advance(drive)
             for name, trace in zip(STREAMS[1:], (drive, measured, true), strict=True):
                 done[name].append(trace)
-            waiting.extend(of(fed_back.achieved(measured)) if fed_back else [])
-            waiting.extend(adapted.achieved(measured) if adapted is not None else [])
+            waiting.extend(observed(ACHIEVED, measured))
     return done
 
 
@@ -148,8 +156,7 @@ every = st.builds(
     InversionSettings,
     st.sets(st.sampled_from(ALL)).map(frozenset),
     st.just(LIMITS),
-    line_feedback=st.booleans(),
-    adapt=st.booleans(),
+    corrections=st.sampled_from([(), (fed_back,), (ADAPTED,), (fed_back, ADAPTED)]),
 )
 
 

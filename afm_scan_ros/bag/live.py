@@ -42,7 +42,7 @@ class LiveWriter(ScanWriter):
     Each message bears the moment at which it is written.
     """
 
-    def __init__(self, folder: Path, info: scan_info.ScanInfo, streams: Iterable[str]) -> None:
+    def __init__(self, folder: Path, info: ScanInfo, streams: Iterable[str]) -> None:
         super().__init__(folder, info, streams)
         self.add_topic(f"/{scan_info.MONITOR}", scan_info.SAMPLE)
         for name in scan_info.LINE_FIGURES:
@@ -64,7 +64,7 @@ class LiveWriter(ScanWriter):
 class LiveRecorder:
     """Monitors and writes the blocks of a scan, those of a sample's drive before its answer."""
 
-    def __init__(self, bag: LiveWriter, info: scan_info.ScanInfo, listener: ScanListener) -> None:
+    def __init__(self, bag: LiveWriter, info: ScanInfo, listener: ScanListener) -> None:
         self._bag, self._info, self._listener = bag, info, listener
         self._errors: LineErrors | None = None
         if info.spec is not None:

@@ -25,7 +25,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO, total_samples
 from afm_scan_ros.files.drive_files import save_drive
 from afm_scan_ros.nodes.flow import USUAL_WINDOW, block_size_at
-from afm_scan_ros.nodes.parameters import INVERSION, inversion_settings
+from afm_scan_ros.nodes.inversion_parameters import INVERSION, ONLINE, inversion_settings
 
 CORRECTED = 2.0
 """Steps of the drive that corrections may add, learned or fed back: as much as the scan itself."""
@@ -99,7 +99,7 @@ def _scan_commands(order: ScanOrder) -> list[NodeCommand]:
         "model_file": str(files.model),
         "inverses": list(order.inverses),
     }
-    fed_back = any(order.own[COMPENSATOR].get(name) for name in ("line_feedback", "adapt"))
+    fed_back = any(order.own[COMPENSATOR].get(name) for name in ONLINE)
     inversion = _inversion(order)
     source = {
         **_window(order, inversion),
@@ -125,7 +125,7 @@ def _inversion(order: ScanOrder) -> ScanInversion:
     """Return the scan's inversion, by the model alone."""
     own = settings_of(COMPENSATOR, INVERSION, order.own.get(COMPENSATOR, {}))
     given = inversion_settings({**own, "inverses": order.inverses})
-    given = evolve(given, line_feedback=False, adapt=False)
+    given = evolve(given, corrections=())
     return ScanInversion(order.model, order.spec, given)
 
 

@@ -11,10 +11,7 @@ from attrs import evolve
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
-from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
-from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
@@ -23,15 +20,13 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes import has_rclpy, lacking_ros
 from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
-from afm_scan_ros.nodes.parameters import (
-    ADAPTATION,
-    ALARMS,
+from afm_scan_ros.nodes.inversion_parameters import (
     INVERSION,
-    SIMULATION,
-    checked,
+    MONITORING,
     inversion_settings,
-    simulated_scanner,
+    scan_monitor,
 )
+from afm_scan_ros.nodes.parameters import SIMULATION, checked, simulated_scanner
 from afm_scan_ros.pipeline import ScanChain, run
 
 
@@ -76,6 +71,10 @@ def _scan(order: orders.ScanOrder) -> None:
         model_hash=model_hash(order.model),
     )
     learned = load_learned(files.learned).correction if files.learned else None
+    monitor = None
+    if order.watched:
+        watched = orders.settings_of(orders.MONITOR, MONITORING, order.own.get(orders.MONITOR, {}))
+        monitor = scan_monitor(order.model, spec, watched)
     chain = ScanChain(
         block=partial(desired, spec),
         driver=_driver(order.scanner, order.own.get(order.scanner.node, {})),
@@ -84,7 +83,7 @@ def _scan(order: orders.ScanOrder) -> None:
         time_scale=order.time_scale,
         inversion=ScanInversion(order.model, spec, given, learned),
         preflight=min(info.total_samples, own["preflight_samples"]),
-        monitor=_monitor(order),
+        monitor=monitor,
         **_flowing(info, flow),
     )
     with showing(f"scan to {files.bag}") as shown:
@@ -128,16 +127,3 @@ def _driver(scanner: ScannerChoice, own: orders.Parameters) -> DriverChoice:
     if scanner.node == SIM_NODE:
         return simulated_scanner(orders.settings_of(SIM_NODE, SIMULATION, given), SIM_NODE)
     return load_settings(str(given["driver"]), Path(str(given["settings_file"])))
-
-
-def _monitor(order: orders.ScanOrder) -> ScanMonitor | None:
-    if not order.watched:
-        return None
-    given = orders.settings_of(
-        orders.MONITOR, (*ALARMS, *ADAPTATION), order.own.get(orders.MONITOR, {})
-    )
-    adaptation = None
-    if given["adapt"]:
-        adaptation = Adaptation(order.model, order.spec, given["adapt_time_constant_s"])
-    watch = ResidualWatch(given["alarm"], given["alarm_lines"])
-    return ScanMonitor(order.model, order.spec, watch, adaptation)

@@ -25,7 +25,6 @@ COMMANDS = {
     "identify": "Identify a model of the scanner from its records.",
     "analyze": "Compare desired with achieved displacement in a bag.",
     "diagnose": "Identify the effect that a model lacks, and write the extended model.",
-    "adapt": "Accept into the model what changed in the scanner during a scan.",
     "close-loop": "Scan, diagnose what the model lacks, extend it, and scan again.",
     "invert": "Write the drive that makes the scanner follow a path, as CSV.",
     "import-csv": "Convert text or array files of measured data to a bag.",
@@ -34,7 +33,6 @@ COMMANDS = {
 }
 
 MODULES = {
-    "adapt": "recorded",
     "analyze": "recorded",
     "diagnose": "recorded",
     "invert": "import_csv",

@@ -1,4 +1,4 @@
-"""``afm-scan analyze``, ``diagnose`` and ``adapt``: what recorded scans show."""
+"""``afm-scan analyze`` and ``diagnose``: what recorded scans show."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -24,21 +24,17 @@ from afm_scan_ros.cli.options import (
     working,
 )
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import plain
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.files import model_file
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import load_model
 from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
-from afm_scan_ros.report.scan_report import adaptation_rows, error_tables, scan_report, scan_rows
+from afm_scan_ros.report.scan_report import error_tables, scan_report, scan_rows
 from afm_scan_ros.report.table import Rows, show
 from afm_scan_ros.report.terminal import say
 
@@ -93,55 +89,6 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
             )
     if json_file is not None:
         write_text(json_file, json.dumps(plain(found), indent=2) + "\n")
-
-
-HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {bag}."
-
-
-@click.command()
-@click.argument("bag", type=RECORD)
-@click.option("--model", required=True, type=FILE, help="Model file of the scanner.")
-@click.option("--out", required=True, type=NEW_FILE, help="Model file to write, with the changes.")
-@click.option(
-    "--time-constant",
-    type=positive("s"),
-    default=f"{TIME_CONSTANT:g}s",
-    show_default=True,
-    help="Memory of the estimator.",
-)
-@topic_option
-def adapt(
-    bag: Path, model: Path, out: Path, time_constant: float, topics: Mapping[str, str]
-) -> None:
-    """Track what changed in the scanner during the scan in BAG, and accept it into the model.
-
-    The model written holds the values at the end of the scan. Nothing is written where nothing has
-    changed beyond the detection limit.
-    """
-    refuse_existing(out, out.with_suffix(".npz"), other="file")
-    base, recording = model_file.load_model(model), read_scan(bag, topics)
-    warn(recording.warnings)
-    if recording.info.spec is None:
-        raise InputError(
-            f"{bag}: adaptation compares lines, but scan_info states none: give the bag of a scan"
-        )
-    spec = recording.info.spec
-    if (lasts := spec.lines / spec.line_rate) <= time_constant:
-        raise InputError(
-            f"--time-constant: {time_constant:g} s is not shorter than the lines of {bag},"
-            f" {lasts:.3g} s: give a shorter one, or a longer scan"
-        )
-    adaptation = Adaptation(base, spec, time_constant)
-    for drive, measured in recording.blocks("drive_voltage", "achieved_displacement"):
-        for _ in adaptation.add(drive, measured):
-            pass
-    show([adaptation_rows(adaptation.states)])
-    shifts = {name: state.shift for name, state in adaptation.states.items()}
-    if all(shift == AxisShift() for shift in shifts.values()):
-        raise ScanError(f"{bag}: nothing has changed beyond the detection limit: no model written")
-    changed = {name: with_shift(base.axis(name), shift) for name, shift in shifts.items()}
-    model_file.save_model(out, evolve(base, **changed), HEADING.format(bag=bag.name))
-    say(f"Model: {out}.")
 
 
 @click.command()

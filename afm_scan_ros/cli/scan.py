@@ -1,10 +1,9 @@
 """``afm-scan scan``: one scan, by nodes or in this process, recorded in a bag."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypedDict, Unpack
 
 import click
 
@@ -35,24 +34,14 @@ from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
-from afm_scan_ros.core.online.adapted_scan import refuse_without_turns
-from afm_scan_ros.core.online.line_feedback import refuse_unsuited
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.flow import FLOW, TIME_SCALE
+from afm_scan_ros.nodes.inversion_parameters import ONLINE
 from afm_scan_ros.nodes.parameters import checked, inverses_of
-
-
-class Online(TypedDict, total=False):
-    """What the compensator corrects by what was achieved; by default nothing."""
-
-    line_feedback: bool
-    """Offset, tilt and gain of each line, from those before."""
-    adapt: bool
-    """Changes of gain, resonance and slow creep."""
 
 
 def run_scan(
@@ -63,13 +52,13 @@ def run_scan(
     *,
     images: bool = False,
     watched: bool = False,
-    **online: Unpack[Online],
+    **online: bool,
 ) -> None:
     """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
     where it has lines of more samples than pixels; ``watched``, its residual too. ``online`` says
-    what is corrected during the scan. Raises InputError before it begins, ScanError where it stays
+    what features do during the scan. Raises InputError before it begins, ScanError where it stays
     incomplete; the bag is then set aside.
     """
     refuse_existing(files.bag)
@@ -80,14 +69,14 @@ def run_scan(
         given = {"time_scale": pace_of(files.scanner), **flow}
         time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
     refuse_pace(time_scale)
-    corrected = {name: online.get(name) is True for name in ("line_feedback", "adapt")}
-    _refuse_unsuited(spec, files.scanner, corrected)
+    online = {**dict.fromkeys(ONLINE, False), **online}
+    _refuse_unsuited(spec, files.scanner, [name for name, wanted in online.items() if wanted])
     correction = _correction(files.learned, spec, model, inverses)
     if (exchange := exchange_of(files.scanner)) is not None:
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
         return
     scanner = choose(files.scanner, files.plant)
-    own = _own(files, scanner, corrected)
+    own = _own(files, scanner, online)
     every = {part: {**own.get(part, {}), **further.get(part, {})} for part in {*own, *further}}
     order = ScanOrder(
         files, spec, flow, model, inverses, scanner, time_scale, every, images, watched
@@ -98,16 +87,14 @@ def run_scan(
         raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 
 
-def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Mapping[str, bool]) -> None:
+def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Collection[str]) -> None:
     """Raise InputError for a scan that cannot be corrected as it goes on."""
-    if online["line_feedback"]:
-        refuse_unsuited(spec)
-    if online["adapt"]:
-        refuse_without_turns(spec)
-    if any(online.values()) and scanner.partition(":")[0] == FILES:
+    for name in online:
+        ONLINE[name].refuse_unsuited(spec)
+    if online and scanner.partition(":")[0] == FILES:
         raise InputError(
-            f"--scanner {scanner}: line feedback and adaptation need a line's readings before a"
-            " later line begins, but files are exchanged once a scan: scan without them"
+            f"--scanner {scanner}: a correction during the scan needs a line's readings before a"
+            " later line begins, but files are exchanged once a scan: scan without it"
         )
 
 
@@ -126,12 +113,13 @@ def _correction(
 def _own(
     files: ScanFiles,
     scanner: ScannerChoice,
-    corrected: Mapping[str, bool],
+    online: Mapping[str, bool],
 ) -> dict[str, Parameters]:
     """Parameters of the compensator and the monitor, before those of their files."""
     learned = {"learned_file": str(files.learned)} if files.learned else {}
-    own = {**learned, **corrected, **_tighter_limits(scanner)}
-    return {COMPENSATOR: own, MONITOR: {"adapt": corrected["adapt"]}}
+    own = {**learned, **online, **_tighter_limits(scanner)}
+    tracked = {name: online[name] for name, each in ONLINE.items() if each.tracker}
+    return {COMPENSATOR: own, MONITOR: tracked}
 
 
 def _tighter_limits(scanner: ScannerChoice) -> Parameters:
@@ -155,6 +143,14 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
     return DriveLimits(min(voltage, amplifier.voltage_limit), min(slew, amplifier.slew_limit))
 
 
+def _online_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of features to a command, a flag each."""
+    for name, each in reversed([*ONLINE.items()]):
+        flag = f"--{name.replace('_', '-')}"
+        command = click.option(flag, is_flag=True, help=each.help)(command)
+    return command
+
+
 @click.command()
 @click.option("--spec", type=FILE, default=CONFIG / "scan.yaml", help="Scan file.")
 @click.option("--model", type=FILE, default=CONFIG / "model.yaml", help="Model file to invert.")
@@ -170,16 +166,7 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
 @click.option("--learned", type=FILE, help="Correction of this scan that 'afm-scan learn' wrote.")
-@click.option(
-    "--line-feedback",
-    is_flag=True,
-    help="Correct offset, tilt and gain of each line from the lines before it.",
-)
-@click.option(
-    "--adapt",
-    is_flag=True,
-    help="Track changes of gain, resonance and slow creep, and scan accordingly.",
-)
+@_online_options
 @click.option("--bag", required=True, type=BAG, help="Folder to create for the bag.")
 def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
@@ -192,17 +179,16 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     bag: Path,
     *,
     watched: bool,
-    line_feedback: bool,
-    adapt: bool,
+    **online: bool,
 ) -> None:
     """Make one scan and record it."""
     run_scan(
         ScanFiles(spec, model, plant, bag, scanner, learned),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
+        {},
         images=True,
         watched=watched,
-        line_feedback=line_feedback,
-        adapt=adapt,
+        **online,
     )
     click.echo(f"Recorded {bag}.")

@@ -1,7 +1,9 @@
 """The drive of a scan, block by block: the model's inverses, and what corrects it meanwhile."""
 
-from collections.abc import Generator, Iterable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Generator, Iterable, Iterator
 from math import floor, log10
+from typing import TypeAlias
 
 import numpy as np
 from attrs import field, frozen
@@ -11,37 +13,66 @@ from afm_scan_ros.core.correction import Correction, Stop
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
-from afm_scan_ros.core.online.line_feedback import LEAD, FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import MAX_BLOCK, cut, end
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, MAX_BLOCK, cut, end
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
+
+LATENCY = 0.04
+"""Seconds from a sample's drive to its reading: two blocks at 50 blocks a second."""
+
+
+class OnlineCorrection(ABC):
+    """Corrects the reference of a scan, while it runs, by what was achieved of it so far.
+
+    What it yields depends on no timing. ``remark`` says in words what it can do in this scan.
+    """
+
+    remark = ""
+
+    @property
+    @abstractmethod
+    def awaited(self) -> int | None:
+        """The line that must be achieved before more can be corrected; None where none must."""
+
+    @abstractmethod
+    def observe(self, name: str, block: Trace) -> None:
+        """Take the next block of a topic, that of a drive before what was achieved under it.
+
+        The topics are those of desired displacement (m), drive (V) and achieved displacement (m).
+        Raises ScanError where nothing can be learned from the block.
+        """
+
+    @abstractmethod
+    def corrected(self, references: Iterable[Trace] = ()) -> Iterator[Trace]:
+        """Take the next blocks of the reference, m; yield what can be corrected."""
+
+    def effect(self) -> str:
+        """Say how the reference is corrected now, for an error that may follow from it."""
+        return ""
+
+
+MakeCorrection: TypeAlias = Callable[[ScannerModel, ScanSpec, int, float], OnlineCorrection]
+"""Makes the correction of a scan, from how late what was achieved is known.
+
+The drive is known so many samples after the desired displacement, and a reading so many seconds
+after its drive. Raises InputError for a scan that cannot be corrected so.
+"""
 
 
 @frozen
 class InversionSettings:
     """How a scan is inverted.
 
-    What was achieved corrects the scan with ``line_feedback`` or ``adapt``. Then ``latency`` (s) is
-    the longest time from a sample's drive to its reading. ``time_constant`` (s) is the memory with
-    which changes are tracked.
+    The ``corrections`` act on its reference one after the other, by what was achieved. ``latency``
+    (s) is the longest time from a sample's drive to its reading.
     """
 
     inverses: frozenset[str]
     limits: DriveLimits
     inverse: InverseSettings = field(factory=InverseSettings)
-    line_feedback: bool = False
-    adapt: bool = False
-    latency: float = LEAD
-    time_constant: float = TIME_CONSTANT
-
-    @property
-    def fed_back(self) -> bool:
-        """Whether the drive depends on what was achieved."""
-        return self.line_feedback or self.adapt
+    corrections: tuple[MakeCorrection, ...] = ()
+    latency: float = LATENCY
 
 
 class ScanInversion:
@@ -65,17 +96,9 @@ class ScanInversion:
             model, spec.sample_period, settings.inverses, settings.inverse, settings.limits
         )
         self._progress = self._compensation.at_rest()
-        self._law: LineFeedback | None = None
-        self._fed_back: FedBack | None = None
-        self._adapted: AdaptedScan | None = None
-        if settings.fed_back:
-            delay = lines_of_delay(spec, self._compensation.held_back, settings.latency)
-        if settings.line_feedback:
-            self._law = LineFeedback(spec, delay)
-            self._fed_back = FedBack(spec, self._law)
-        if settings.adapt:
-            adaptation = Adaptation(model, spec, settings.time_constant)
-            self._adapted = AdaptedScan(model, spec, adaptation, delay)
+        self._corrections = [
+            make(model, spec, self.held_back, settings.latency) for make in settings.corrections
+        ]
         self._stop: Stop = None
         self._end: int | None = None
         self.driven = 0
@@ -87,18 +110,13 @@ class ScanInversion:
 
     @property
     def remark(self) -> str:
-        """What the line feedback can do; nothing without it."""
-        if self._law is None:
-            return ""
-        return (
-            f"line feedback: line k is corrected by lines up to k - {self._law.delay}; drifts"
-            f" slower than {self._law.bandwidth:.3g} Hz are reduced"
-        )
+        """What the corrections can do, in words."""
+        return "; ".join(each.remark for each in self._corrections if each.remark)
 
     @property
     def awaited(self) -> int | None:
         """The line that must be achieved before more can be driven; None where none must."""
-        waiting = (each.awaited for each in (self._fed_back, self._adapted) if each is not None)
+        waiting = (each.awaited for each in self._corrections)
         return min((line for line in waiting if line is not None), default=None)
 
     def largest_step(self, samples: int) -> float:
@@ -140,39 +158,30 @@ class ScanInversion:
         reference = block
         if self._learned is not None:
             self._stop, reference = self._learned.follow(self._stop, block)
-        references: Iterable[Trace] = [reference]
-        if self._fed_back is not None:
-            references = self._fed_back.desired(block, reference)
-        yield from self._driven(references)
+        yield from self._driven(DESIRED, block, [reference])
 
     def achieved(self, block: Trace) -> Iterator[Trace]:
         """Take the next block of the achieved displacement; yield the drive that waited for it.
 
         Raises ScanError as ``desired`` does.
         """
-        if self._fed_back is not None:
-            yield from self._driven(self._fed_back.achieved(block))
-        if self._adapted is not None:
-            yield from self._inverted(self._adapted.achieved(block))
+        yield from self._driven(ACHIEVED, block, [])
 
     def is_last(self, drive: Trace) -> bool:
         """Return whether a block of the drive is the last one."""
         return end(drive) == self._end
 
-    def _driven(self, references: Iterable[Trace]) -> Iterator[Trace]:
-        """Yield the drive of what is desired with all corrections but adaptation, and with it."""
-        if self._adapted is None:
-            yield from self._inverted(references)
-            return
+    def _driven(self, name: str, block: Trace, references: Iterable[Trace]) -> Iterator[Trace]:
+        """Yield the drive of references, and of those that waited for a block of a topic."""
+        for each in self._corrections:
+            each.observe(name, block)
+        for each in self._corrections:
+            references = each.corrected(references)
         for reference in references:
-            yield from self._inverted(self._adapted.desired(reference))
-
-    def _inverted(self, corrected: Iterable[Trace]) -> Iterator[Trace]:
-        for block in corrected:
-            drive = self._drive(block, last=end(block) == self._end)
+            drive = self._drive(reference, last=end(reference) == self._end)
             self.driven = end(drive)
-            if self._adapted is not None:
-                self._adapted.driven(drive)
+            for each in self._corrections:
+                each.observe(DRIVE, drive)
             yield from cut(drive)
 
     def _drive(self, block: Trace, *, last: bool) -> Trace:
@@ -181,18 +190,12 @@ class ScanInversion:
             self._progress, drive = self._compensation.invert(self._progress, block)
             owed = self._compensation.finish(self._progress) if last else None
         except ScanError as error:
-            raise ScanError(f"{error}{self._corrected_by()}") from error
+            effects = filter(None, (each.effect() for each in self._corrections))
+            raise ScanError("; ".join([str(error), *effects])) from error
         if owed is None:
             return drive
         x, y = np.append(drive.x, owed.x), np.append(drive.y, owed.y)
         return Trace(drive.first_sample, drive.sample_period, x, y)
-
-    def _corrected_by(self) -> str:
-        if self._fed_back is None:
-            return ""
-        moved = self._fed_back.corrected_by().items()
-        corrections = ", ".join(f"{axis} by {1e6 * offset:.3g} µm" for axis, offset in moved)
-        return f"; line feedback corrects {corrections}"
 
 
 def _advice(ranges: Ranges) -> str:

@@ -1,8 +1,9 @@
 """Features: each folder here holds all of one subject, and states what it adds to the kernel.
 
-A feature is a package that may state ``COMMANDS``, what each of its commands does, and ``DRIVERS``,
-the class of each of its drivers by short name. The command NAME stands in ``NAME_command`` of the
-package. The kernel knows features by this registry alone, and no feature imports another.
+A feature is a package that may state ``COMMANDS``, what each of its commands does, ``DRIVERS``, the
+class of each of its drivers by short name, and ``ONLINE``, the place of each ``OnlineOption`` of a
+scan. The command NAME stands in ``NAME_command`` of the package. The kernel knows features by this
+registry alone, and no feature imports another.
 """
 
 import pkgutil
@@ -10,6 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 
 @cache
@@ -26,6 +28,11 @@ def commands() -> Mapping[str, str]:
 def drivers() -> Mapping[str, str]:
     """Return the class of each driver of a feature, as ``module:Class``, by its short name."""
     return _joined("DRIVERS")
+
+
+def options() -> Mapping[str, Any]:
+    """Return what features do while a scan runs, an ``OnlineOption`` each, by its name."""
+    return {name: pkgutil.resolve_name(place) for name, place in _joined("ONLINE").items()}
 
 
 def module_of(command: str) -> str:

@@ -14,7 +14,8 @@ from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of
-from afm_scan_ros.nodes.parameters import INVERSION, MODEL_FILE, inversion_settings, model_of
+from afm_scan_ros.nodes.inversion_parameters import INVERSION, inversion_settings
+from afm_scan_ros.nodes.parameters import MODEL_FILE, model_of
 from afm_scan_ros.nodes.peers import RUNNING, Report
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, NodeTopic
 
@@ -42,7 +43,7 @@ class InversionCompensator(BlockConsumer):
         self._inversion: ScanInversion
         self._moved_at = 0.0
         self._given = inversion_settings(self.settings)
-        self.read([DESIRED, ACHIEVED] if self._given.fed_back else [DESIRED])
+        self.read([DESIRED, ACHIEVED] if self._given.corrections else [DESIRED])
         file = self.settings["learned_file"]
         with naming("parameter learned_file"):
             self._learned = load_learned(Path(file)) if file else None

@@ -1,21 +1,18 @@
 """Parameters of the nodes: name, type, description, range; and what is made of their values."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from attrs import Attribute, frozen
 
-from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES
-from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
+from afm_scan_ros.core.diagnosis.scan_monitor import Tracker
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
-from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.line_feedback import LEAD
-from afm_scan_ros.core.scan_inversion import InversionSettings
-from afm_scan_ros.core.scan_spec import human_name, scan_parameters
+from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_inversion import MakeCorrection
+from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
@@ -37,6 +34,22 @@ class NodeParameter:
     choices: tuple[str, ...] = ()
 
 
+@frozen
+class OnlineOption:
+    """What a feature does while a scan runs, if the parameter and the option of its name say so.
+
+    ``help`` is that of the option. ``parameters`` are those of the compensator, and of the monitor
+    where there is a ``tracker``; ``correction`` and ``tracker`` are made by their values.
+    ``refuse_unsuited`` raises InputError for a scan that cannot be corrected so.
+    """
+
+    help: str
+    parameters: tuple[NodeParameter, ...]
+    refuse_unsuited: Callable[[ScanSpec], None]
+    correction: Callable[[Mapping[str, Any]], MakeCorrection]
+    tracker: Callable[[ScannerModel, ScanSpec, Mapping[str, Any]], Tracker] | None = None
+
+
 MODEL_FILE = NodeParameter(
     "model_file", str(share_directory() / "config/model.yaml"), "Model of the scanner"
 )
@@ -46,73 +59,6 @@ DRIVE_LIMITS = (
 )
 
 
-ADAPTATION = (
-    NodeParameter(
-        "adapt",
-        default=False,
-        description="Whether changes of gain, resonance and slow creep are tracked",
-    ),
-    NodeParameter(
-        "adapt_time_constant_s", TIME_CONSTANT, "With adapt: memory of the estimator", low=0.0
-    ),
-)
-
-
-_DEFAULT, _WEIGHT = InverseSettings(), RelativeWeight()
-INVERSION = (
-    NodeParameter("inverses", list(INVERSES), "Effects to invert: creep, ...; or none"),
-    NodeParameter(
-        "hysteresis_inverse",
-        _DEFAULT.hysteresis_inverse,
-        "Inverse of hysteresis: exact, the paper's direct inverse, or the model's choice",
-        choices=("as_identified", "exact", "direct"),
-    ),
-    NodeParameter(
-        "weight_corner_hz",
-        0.0,
-        f"Frequency above which the inverse limits the drive; 0 for {_WEIGHT.corner:g}"
-        " times the first resonance",
-        low=0.0,
-    ),
-    NodeParameter("weight_order", _WEIGHT.order, "Steepness of that transition", low=1, high=10),
-    NodeParameter(
-        "preview_ms",
-        0.0,
-        "Preview of the inverse; 0 for as long as its response needs",
-        low=0.0,
-        high=1000.0,
-    ),
-    *DRIVE_LIMITS,
-    NodeParameter("learned_file", "", "Learned correction of this scan; empty for none"),
-    NodeParameter(
-        "preflight_samples",
-        5_000_000,
-        "Largest scan, in samples, that is inverted before it begins",
-        low=0,
-    ),
-    NodeParameter(
-        "line_feedback",
-        default=False,
-        description="Whether offset, tilt and gain are corrected from the last lines",
-    ),
-    NodeParameter(
-        "feedback_latency_ms",
-        LEAD * 1e3,
-        "With line_feedback or adapt: longest time from a sample's drive to its reading",
-        low=0.0,
-        high=10_000.0,
-    ),
-    *ADAPTATION,
-)
-ALARMS = (
-    NodeParameter(
-        "alarm",
-        ALARM_RATIO,
-        "Residual over model discrepancy that makes a line suspect",
-        low=1.0,
-    ),
-    NodeParameter("alarm_lines", LINES, "Suspect lines in a row that raise the alarm", low=1),
-)
 SIMULATION = (
     NodeParameter("plant_file", str(share_directory() / "config/plant.yaml"), "Simulated scanner"),
     NodeParameter("seed", 1, "Seed of the sensor's noise", low=0),
@@ -124,28 +70,6 @@ SIMULATION = (
 )
 _METRES = AxisSettings(1.0, 0.0, -sys.float_info.max, sys.float_info.max)
 """The simulated sensor reads metres, and checks its own range."""
-
-
-def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
-    """Return how a scan is inverted by the parameters ``INVERSION``; refuses limits of zero."""
-    given = settings
-    return InversionSettings(
-        inverses_of(given["inverses"], INVERSES),
-        drive_limits(given),
-        InverseSettings(
-            hysteresis_inverse=given["hysteresis_inverse"],
-            weight=_weight(given["weight_corner_hz"], given["weight_order"]),
-            preview=given["preview_ms"] * 1e-3 or None,
-        ),
-        line_feedback=given["line_feedback"],
-        adapt=given["adapt"],
-        latency=given["feedback_latency_ms"] * 1e-3,
-        time_constant=given["adapt_time_constant_s"],
-    )
-
-
-def _weight(corner: float, order: int) -> Weight | RelativeWeight:
-    return SmoothWeight(corner, order) if corner else RelativeWeight(order=order)
 
 
 def simulated_scanner(settings: Mapping[str, Any], where: str) -> DriverChoice:

@@ -2,9 +2,7 @@
 
 from collections.abc import Iterator
 
-from afm_scan_ros.core.diagnosis.monitor import ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
-from afm_scan_ros.core.online.adaptation import Adaptation
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
@@ -12,8 +10,9 @@ from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
+from afm_scan_ros.nodes.inversion_parameters import MONITORING, scan_monitor
 from afm_scan_ros.nodes.messages import tracking_message
-from afm_scan_ros.nodes.parameters import ADAPTATION, ALARMS, MODEL_FILE, model_of
+from afm_scan_ros.nodes.parameters import MODEL_FILE, model_of
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
 
@@ -25,7 +24,7 @@ class ResidualMonitor(StreamReader):
     """
 
     NAME = "residual_monitor"
-    PARAMETERS = (MODEL_FILE, *ALARMS, *ADAPTATION, min_subscriptions(0))
+    PARAMETERS = (MODEL_FILE, *MONITORING, min_subscriptions(0))
 
     @classmethod
     def warm_up(cls) -> None:
@@ -43,17 +42,13 @@ class ResidualMonitor(StreamReader):
 
     def prepare(self, info: ScanInfo) -> Iterator[str]:
         """Compute the places of the lines and their detection limit."""
-        spec, given = spec_of(info), self.settings
+        spec = spec_of(info)
         if info.model_hash != model_hash(self._model):
             self.get_logger().warning(
                 "this scan is compensated with another model than the monitor compares with"
             )
         yield "computing the expected residual"
-        adaptation = None
-        if given["adapt"]:
-            adaptation = Adaptation(self._model, spec, given["adapt_time_constant_s"])
-        watch = ResidualWatch(given["alarm"], given["alarm_lines"])
-        self._monitor = ScanMonitor(self._model, spec, watch, adaptation)
+        self._monitor = scan_monitor(self._model, spec, self.settings)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the residuals of the lines that a block completes, and their alarms."""

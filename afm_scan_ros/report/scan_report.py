@@ -1,4 +1,4 @@
-"""The reports on one scan, on the demonstration, and on what adaptation found: tables, pages."""
+"""The reports on one scan, and on the demonstration: tables, pages."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
@@ -9,47 +9,11 @@ from matplotlib.figure import Figure
 from afm_scan_ros.core.metrics import AxisError, Tracking
 from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.model import INVERSES
-from afm_scan_ros.core.online.adaptation import CREEP_NAME, AxisState, Outcome
-from afm_scan_ros.core.online.adapted_reference import AxisShift
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import Images, ScanExcerpt, image_figure, tracking_figure
 from afm_scan_ros.report.table import Row, Rows, Table
-
-ADAPTED = ("axis", "parameter", "value", "unchanged", "outcome", "detection limit")
-NAMES = {
-    "gain": "factor on the gain",
-    "frequency": "factor on the first resonance's frequency",
-    "loss": "factor on its damping ratio, over that on the frequency",
-    CREEP_NAME: "gain of slow creep beyond the model's",
-}
-OUTCOMES = {
-    Outcome.UNCHANGED: "within the detection limit",
-    Outcome.CHANGED: "changed",
-    Outcome.NOT_EXCITED: "not excited by this scan",
-    Outcome.BEYOND_BOUNDS: "beyond its bounds: identify the scanner anew",
-    Outcome.OTHER_CAUSE: "not distinguished from another change: diagnose this scan",
-}
-
-
-PER_UNKNOWN = {"frequency": 0.5}
-"""Change of a value per change of its unknown, near 1; 1 where it is left out: a = 1/f² - 1."""
-
-
-def adaptation_rows(states: Mapping[str, AxisState]) -> Rows:
-    """Return one row for each axis and parameter."""
-    rows = [row for name, state in states.items() for row in _rows(name, state)]
-    return Rows(ADAPTED, rows)
-
-
-def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
-    for name, finding in state.findings.items():
-        value, unchanged = (getattr(shift, name) for shift in (state.shift, AxisShift()))
-        dead_zone = PER_UNKNOWN.get(name, 1.0) * finding.dead_zone
-        limit = "" if finding.outcome is Outcome.NOT_EXCITED else f"{dead_zone:.2g}"
-        yield axis, NAMES[name], f"{value:.4f}", f"{unchanged:g}", OUTCOMES[finding.outcome], limit
-
 
 DEFINITION = (
     "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"

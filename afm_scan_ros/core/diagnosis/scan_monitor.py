@@ -1,6 +1,7 @@
 """Compares a scan with the model while it runs: the residual of each line, alarms, changes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from attrs import frozen
@@ -14,7 +15,6 @@ from afm_scan_ros.core.diagnosis.monitor import (
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.online.adaptation import EXPECTED, Adaptation, AxisState
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.streams import ACHIEVED, DRIVE, Aligner, LineError
@@ -33,11 +33,15 @@ class ScanNews:
     expected: bool = False
 
 
+Tracker: TypeAlias = Callable[[Trace, Trace], Iterator[ScanNews]]
+"""Takes the next run of samples, drive (V) and achieved displacement (m), and says what is new."""
+
+
 class ScanMonitor:
     """Takes the blocks of one scan, drive (V) and achieved displacement (m).
 
-    ``adaptation`` tracks what changes, if it is to be tracked. Once the drive leaves the model's
-    identified range, nothing more can be predicted. Raises InputError where the model states no
+    ``trackers`` look for what else changes. Once the drive leaves the model's identified range,
+    nothing more can be predicted. Raises InputError where the model states no
     model discrepancy. Its loops are compiled when it is made, not while others wait.
     """
 
@@ -46,11 +50,11 @@ class ScanMonitor:
         model: ScannerModel,
         spec: ScanSpec,
         watch: ResidualWatch,
-        adaptation: Adaptation | None = None,
+        trackers: Sequence[Tracker] = (),
     ) -> None:
         predict(model, Trace(0, spec.sample_period, np.zeros(2), np.zeros(2)))
         self._residuals = LineResiduals(model, spec, expected_limits(model, spec))
-        self._watch, self._adaptation = watch, adaptation
+        self._watch, self._trackers = watch, trackers
         self._aligner = Aligner((DRIVE, ACHIEVED))
         self._lost = ""
 
@@ -78,15 +82,8 @@ class ScanMonitor:
             yield _figures(line)
             for change in self._watch.news(line):
                 yield ScanNews(_text(change), alarm=bool(self._watch.alarms))
-        yield from self._tracked(drive, measured)
-
-    def _tracked(self, drive: Trace, measured: Trace) -> Iterator[ScanNews]:
-        if self._adaptation is None:
-            return
-        before = dict(self._adaptation.states)
-        for _ in self._adaptation.add(drive, measured):
-            yield from _changes(before, self._adaptation.states)
-            before = dict(self._adaptation.states)
+        for track in self._trackers:
+            yield from track(drive, measured)
 
 
 def _text(alarm: ResidualAlarm) -> str:
@@ -99,17 +96,6 @@ def _text(alarm: ResidualAlarm) -> str:
         f" {found.normalised_residual:.3g} times the model discrepancy from {low:g} to {high:g}"
         " Hz. Diagnose this scan's bag"
     )
-
-
-def _changes(before: Mapping[str, AxisState], after: Mapping[str, AxisState]) -> Iterator[ScanNews]:
-    """Yield a sentence for each parameter of which something else is known than before."""
-    for axis, state in after.items():
-        for name, finding in state.findings.items():
-            old = before[axis].findings.get(name)
-            if old is None or old.outcome is not finding.outcome:
-                value, known = getattr(state.shift, name), finding.outcome.value
-                sentence = f"{axis}: by line {state.lines - 1} the {name} is {known}: {value:.4g}"
-                yield ScanNews(sentence, expected=finding.outcome in EXPECTED)
 
 
 def _figures(line: LineResidual) -> LineError:

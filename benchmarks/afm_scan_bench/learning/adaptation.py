@@ -4,7 +4,6 @@ The load on x changes evenly over the scan. The scan is made in process, in bloc
 lines. What a block shows is in force from the next block but one on.
 """
 
-from collections import deque
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -14,13 +13,12 @@ from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, spec_at
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import Aligner, end
+from afm_scan_ros.core.streams import ACHIEVED, DRIVE, Aligner, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adaptation import TIME_CONSTANT, Adaptation
+from afm_scan_ros.features.online.adapted_scan import AdaptedScan
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -77,7 +75,7 @@ def tracked(spec: ScanSpec, drift: float, *, adapt: bool, memory: float = TIME_C
     for first in range(0, where.total, size):
         target = desired(spec, first, min(size, where.total - first))
         held.add("target", target)
-        reference = _joined(adapted.desired(target)) if adapt else target
+        reference = _joined(adapted.corrected([target])) if adapt else target
         progress, drive = compensation.invert(progress, reference)
         drives = [drive]
         if end(target) == where.total:
@@ -86,8 +84,8 @@ def tracked(spec: ScanSpec, drift: float, *, adapt: bool, memory: float = TIME_C
             measured, true = scanner.advance(drive)
             held.add("true", true)
             if adapt:
-                adapted.driven(drive)
-                deque(adapted.achieved(measured), maxlen=0)  # no block waits for it
+                adapted.observe(DRIVE, drive)
+                adapted.observe(ACHIEVED, measured)  # no block waits for it
         meter.add(held)
         at = slice(max(0, (first - where.lines.start) // spec.samples_per_line), None)
         frequency[at] = adaptation.states["x"].shift.frequency

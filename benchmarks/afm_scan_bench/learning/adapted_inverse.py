@@ -7,10 +7,10 @@ from afm_scan_bench.detune import detuned
 from afm_scan_bench.scans import ALL, SEED, default_model, default_plant, relative_error, spec_at
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
-from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilter, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.features.online.adapted_reference import AxisShift, ReferenceFilter, with_shift
 from afm_scan_ros.report.table import Table
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 

@@ -9,11 +9,12 @@ from afm_scan_bench.scans import ALL, SEED, default_model
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online.line_feedback import FedBack, LineFeedback, lines_of_delay
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import end
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, end
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.features.online.line_correction import lines_of_delay
+from afm_scan_ros.features.online.line_feedback import FedBack
 from afm_scan_ros.nodes.flow import block_size_at
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
@@ -35,11 +36,13 @@ def fed_back_scan(
     compensation = Compensation(default_model(), period, ALL, InverseSettings(), limits)
     chain = _Chain(compensation, Piezoscanner(plant, period, SEED, age), total)
     delay = lines_of_delay(spec, compensation.held_back)
-    fed_back = FedBack(spec, LineFeedback(spec, delay)) if corrects else None
+    fed_back = FedBack(spec, delay) if corrects else None
     size = block_size or block_size_at(period)
     for first in range(0, total, size):
         block = desired(spec, first, min(size, total - first))
-        chain.follow([block] if fed_back is None else fed_back.desired(block, block), fed_back)
+        if fed_back is not None:
+            fed_back.observe(DESIRED, block)
+        chain.follow([block] if fed_back is None else fed_back.corrected([block]), fed_back)
     return Scan(spec, desired(spec, 0, total), *chain.signals())
 
 
@@ -61,7 +64,8 @@ class _Chain:
             measured, true = self._scanner.advance(drive)
             self._made.append((drive, measured, true))
             if fed_back is not None:
-                waiting.extend(fed_back.achieved(measured))
+                fed_back.observe(ACHIEVED, measured)
+                waiting.extend(fed_back.corrected())
 
     def signals(self) -> list[Trace]:
         """Return drive, measured and true displacement."""

@@ -15,11 +15,11 @@ from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.online.adaptation import Adaptation
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan
-from afm_scan_ros.core.online.line_feedback import lines_of_delay
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import ACHIEVED, DRIVE, end, part
 from afm_scan_ros.core.trajectory import desired, total_samples
+from afm_scan_ros.features.online.adaptation import Adaptation
+from afm_scan_ros.features.online.adapted_scan import AdaptedScan
+from afm_scan_ros.features.online.line_correction import lines_of_delay
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -59,7 +59,7 @@ def test_nodes_adapt_as_one_process_does(
     progress, target = compensation.at_rest(), desired(spec, 0, total_samples(spec))
     for first in range(0, len(target.x), BLOCK):
         block = part(target, first, min(first + BLOCK, len(target.x)))
-        waiting = deque(adapted.desired(block))
+        waiting = deque(adapted.corrected([block]))
         while waiting:
             block = waiting.popleft()
             progress, now = compensation.invert(progress, block)
@@ -68,6 +68,7 @@ def test_nodes_adapt_as_one_process_does(
             found = part(drive, now.first_sample, end(now))
             np.testing.assert_array_equal(found.x, now.x)
             np.testing.assert_array_equal(found.y, now.y)
-            adapted.driven(now)
-            waiting.extend(adapted.achieved(scanner.advance(now)[0]))
+            adapted.observe(DRIVE, now)
+            adapted.observe(ACHIEVED, scanner.advance(now)[0])
+            waiting.extend(adapted.corrected())
     assert adaptation.states["x"].shift.frequency == pytest.approx(1.05**-0.5, abs=2e-3)

@@ -8,11 +8,11 @@ from attrs import evolve
 
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import CreepModel, ScannerModel
-from afm_scan_ros.core.online.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.online.adaptation import Adaptation, AxisState, Outcome
+from afm_scan_ros.features.online.adapted_reference import AxisShift, with_shift
 from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(lines=40, line_rate=2.0, samples_per_line=2000, preparation_rate=5.0)

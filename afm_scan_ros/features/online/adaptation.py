@@ -25,26 +25,28 @@ from scipy.special import ndtri
 
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
+from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.online import TIME_CONSTANT
-from afm_scan_ros.core.online.adapted_reference import AxisShift, room, slowest
-from afm_scan_ros.core.online.line_signals import (
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adapted_reference import AxisShift, room, slowest
+from afm_scan_ros.features.online.line_signals import (
     GAIN,
     HYSTERESIS,
     UNKNOWNS,
     LineSignals,
     ScanSignals,
 )
-from afm_scan_ros.core.online.shift_estimate import (
+from afm_scan_ros.features.online.shift_estimate import (
     CreepInformation,
     Information,
     LineInformation,
     ShiftEstimate,
     estimate,
 )
-from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.types import AXES, Array, Trace
 
+TIME_CONSTANT = 1.0
+"""Default memory, s."""
 FALSE_CHANGE = 0.01
 """Probability that a parameter of an unchanged scanner is changed in a scan."""
 PARAMETERS = ("gain", "frequency", "loss")
@@ -238,3 +240,22 @@ class Adaptation:
             for name, axis in self._axes.items():
                 self.states[name] = axis.learn(self.states[name], line[name])
             yield number, {name: state.shift for name, state in self.states.items()}
+
+    def news(self, drive: Trace, measured: Trace) -> Iterator[ScanNews]:
+        """Take the next run of samples, as ``add`` does; yield what it changes in what is known."""
+        before = dict(self.states)
+        for _ in self.add(drive, measured):
+            for axis, state in self.states.items():
+                yield from _news(axis, before[axis].findings, state)
+            before = dict(self.states)
+
+
+def _news(
+    axis: str, before: Mapping[str, AdaptationFinding], state: AxisState
+) -> Iterator[ScanNews]:
+    """Yield a sentence for each parameter of which something else is known than ``before``."""
+    for name, finding in state.findings.items():
+        if name not in before or before[name].outcome is not finding.outcome:
+            value, known = getattr(state.shift, name), finding.outcome.value
+            sentence = f"{axis}: by line {state.lines - 1} the {name} is {known}: {value:.4g}"
+            yield ScanNews(sentence, expected=finding.outcome in EXPECTED)

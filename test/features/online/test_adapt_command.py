@@ -8,12 +8,12 @@ from click.testing import CliRunner, Result
 
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.orders import ScanFiles
-from afm_scan_ros.cli.recorded import adapt
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.features.online.adapt_command import adapt
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.simulation.axis import detuned_axis

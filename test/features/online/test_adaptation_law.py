@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, AxisModel
-from afm_scan_ros.core.online.adaptation import Adaptation, AxisState, Outcome
-from afm_scan_ros.core.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.streams import part
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Trace
+from afm_scan_ros.features.online.adaptation import Adaptation, AxisState, Outcome
+from afm_scan_ros.features.online.adapted_reference import AxisShift, with_shift
 from afm_scan_ros.simulation.axis import detuned_axis
 from helpers.in_process import ALL, FAST_SPEC, default_model, default_plant, scan
 

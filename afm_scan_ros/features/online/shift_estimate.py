@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.bands import bounds, coefficients
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.online.adapted_reference import room
-from afm_scan_ros.core.online.line_signals import GAIN, HYSTERESIS, UNKNOWNS, LineSignals
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.online.adapted_reference import room
+from afm_scan_ros.features.online.line_signals import GAIN, HYSTERESIS, UNKNOWNS, LineSignals
 
 ROOM = np.append(room()[:HYSTERESIS], 1.0)
 """Distance of each unknown from 0 to its nearest bound, (4,)."""

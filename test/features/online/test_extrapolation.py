@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.online.extrapolation import (
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.online.extrapolation import (
     DEGREES,
     LARGEST_GAIN_ERROR,
     LARGEST_SUM,
@@ -13,7 +14,6 @@ from afm_scan_ros.core.online.extrapolation import (
     Extrapolation,
     methods,
 )
-from afm_scan_ros.core.types import Array
 
 DELAYS = (1, 2, 3, 7, 20)
 delays = pytest.mark.parametrize("delay", DELAYS)

@@ -22,7 +22,7 @@ weights is the cross-fade of the outputs of two filters that run side by side.
 from math import expm1, inf
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import astuple, evolve, frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
@@ -54,7 +54,8 @@ class AxisShift:
             return None
         frequency = (1.0 + alpha) ** -0.5
         found = cls(1.0 + change, frequency, frequency * (1.0 + beta), creep)
-        return found if found.within_bounds else None
+        pairs = zip(BOUNDS, astuple(found), strict=True)
+        return found if all(bound.lower < value < bound.upper for bound, value in pairs) else None
 
     @property
     def loss(self) -> float:
@@ -66,13 +67,6 @@ class AxisShift:
         """Return (g - 1, a, b, c)."""
         alpha, beta = self.frequency**-2 - 1.0, self.loss - 1.0
         return np.array([self.gain - 1.0, alpha, beta, self.creep])
-
-    @property
-    def within_bounds(self) -> bool:
-        """Whether each value keeps to the bounds that the catalogue has for it."""
-        values = self.gain, self.frequency, self.damping, self.creep
-        factors = zip(BOUNDS, values, strict=True)
-        return all(bound.lower < value < bound.upper for bound, value in factors)
 
     @property
     def weights(self) -> Array:

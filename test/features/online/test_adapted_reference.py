@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.online.adapted_reference import AxisShift, ReferenceFilter, with_shift
-from afm_scan_ros.core.online.adapted_scan import AdaptedScan, refuse_without_turns
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import ACHIEVED, DRIVE, end, part
 from afm_scan_ros.core.trajectory import desired, phases, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adapted_reference import AxisShift, ReferenceFilter, with_shift
+from afm_scan_ros.features.online.adapted_scan import AdaptedScan
+from afm_scan_ros.features.online.line_correction import refuse_unsuited
 from helpers.in_process import FAST_SPEC, default_model
 
 SPEC = evolve(FAST_SPEC, preparation_cycles=2)
@@ -61,9 +62,10 @@ def adapted(shifts: dict[int, AxisShift], cuts: list[int]) -> Trace:
     edges = [0, *sorted(cuts), len(TARGET.x)]
     for start, stop in pairwise(edges):
         block = part(TARGET, start, stop)
-        parts += scan.desired(block)
-        scan.driven(block)
-        parts += scan.achieved(block)
+        parts += scan.corrected([block])
+        scan.observe(DRIVE, block)
+        scan.observe(ACHIEVED, block)
+        parts += scan.corrected()
     x, y = (np.concatenate([each.axis(name) for each in parts]) for name in AXES)
     return Trace(0, SPEC.sample_period, x, y)
 
@@ -148,7 +150,7 @@ def test_there_is_no_shift_beyond_the_bounds(unknowns: tuple[float, ...]) -> Non
 )
 def test_a_scan_without_turn_arounds_is_refused(spec: ScanSpec, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        refuse_without_turns(spec)
+        refuse_unsuited("adaptation", spec)
 
 
 def test_a_resonance_beyond_the_samples_is_refused() -> None:

@@ -18,12 +18,12 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.model import Added, ScannerModel
-from afm_scan_ros.core.online.adapted_reference import ResonanceParts, SlowSection
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import Prediction
 from afm_scan_ros.core.streams import WholeLines
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.features.online.adapted_reference import ResonanceParts, SlowSection
 
 STEP = 0.01
 """Share by which the hysteresis is changed to see its part."""
