@@ -1,37 +1,33 @@
-"""Images of Gwyddion, ``.gwy``, read and written by the package gwyfile.
+"""Images of Gwyddion: ``.gwy`` by the package gwyfile, and ``.gsf`` by the package gsffile.
 
-A data field begins with the top row, at the highest y: Gwyddion's manual, "Gwyddion native format",
-states the offsets as those of the top-left corner. Columns begin at the lowest x, also in a
-retrace, since Gwyddion mirrors what instruments store otherwise. The format itself states neither
-line time nor direction. Files of this package state both in the metadata of each channel.
+Both formats begin with the top row, at the highest y: Gwyddion's manual, "Gwyddion native format"
+and "Gwyddion Simple Field". Columns begin at the lowest x, also in a retrace, since Gwyddion
+mirrors what instruments store otherwise. The formats state neither line time nor direction. Files
+of this package state both: in the metadata of each channel, and as further fields.
 
-An object is a name, a size and components, and a component a name, a letter for its type and its
-data. gwyfile may never return from a file whose sizes are damaged, so they are checked before.
+A ``.gsf`` file holds one channel in one direction, of 32 bits. In a ``.gwy`` file, an object is a
+name, a size and components, and a component a name, a letter for its type and its data. gwyfile
+may never return from a file whose sizes are damaged, so they are checked before.
 """
 
 import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-import gwyfile
 import numpy as np
 from attrs import define
-from gwyfile.objects import GwyContainer, GwyDataField
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.features.images.files.channels import (
     Direction,
-    FoundChannel,
     ImageChannel,
-    ScanFacts,
     facts_of,
-    in_si,
     metres,
-    paired,
+    split_title,
 )
-from afm_scan_ros.files.columns import Signal
 from afm_scan_ros.files.paths import replacing
 
 FIELD = re.compile(r"/(\d+)/data")
@@ -45,66 +41,103 @@ DEEPEST = 20
 """Objects within objects; a channel's unit is the third."""
 MOST_PARTS = 10**5
 """Components and texts of a file, each of which takes hundreds of bytes in memory."""
+RANGES = ("XReal", "YReal")
+FORBIDDEN = ("=", "\n", "\r", "\0")
+"""Characters that end the name or the value of a field of a ``.gsf`` file."""
 
 
-def read(path: Path) -> Sequence[FoundChannel]:
-    """Read all channels, paired by their titles; raises ValueError for a file cut short."""
+def read_gsf(gsffile: ModuleType, path: Path) -> Iterator[Direction]:
+    """Read the only channel; raises InputError where its ranges are not stated."""
+    values, stated = gsffile.read_gsf(path)
+    for key in RANGES:
+        if key not in stated:
+            raise InputError(f"states no {key}: save it with its ranges in m")
+    range_x, range_y = (metres(key, stated[key], stated.get("XYUnits", "")) for key in RANGES)
+    facts = facts_of(range_x, range_y, stated)
+    title, unit = stated.get("Title", "Channel"), stated.get("ZUnits", "")
+    yield Direction(*split_title(title), unit, facts, np.asarray(values, dtype=float)[::-1])
+
+
+def write_gsf(
+    gsffile: ModuleType,
+    targets: Sequence[Path],
+    channels: Sequence[ImageChannel],
+    stated: Mapping[str, str],
+) -> None:
+    """Write a file a channel; raises InputError for what a file cannot hold, and writes none."""
+    fields = [{**_fields(channel), **stated} for channel in channels]
+    for path, channel, words in zip(targets, channels, fields, strict=True):
+        for name, value in words.items():
+            if any(mark in f"{name}{value}" for mark in FORBIDDEN):
+                raise InputError(f"{path}: {name} holds '=' or a line end: leave it out")
+        if np.abs(channel.values).max() > np.finfo(np.float32).max:
+            raise InputError(f"{path}: a value is too large for 32 bits: write .gwy or .nc")
+    for path, channel, words in zip(targets, channels, fields, strict=True):
+        rows = np.ascontiguousarray(channel.values[::-1], dtype=np.float32)
+        with replacing(path) as beside:
+            gsffile.write_gsf(beside, rows, words)
+
+
+def _fields(channel: ImageChannel) -> dict[str, str]:
+    return {
+        "XReal": repr(float(channel.range_x)),
+        "YReal": repr(float(channel.range_y)),
+        "XOffset": repr(float(channel.left)),
+        "YOffset": repr(float(channel.bottom)),
+        "Title": channel.title,
+        "XYUnits": "m",
+        "ZUnits": channel.unit,
+    }
+
+
+def read_gwy(gwyfile: ModuleType, path: Path) -> Iterator[Direction]:
+    """Read all channels; raises InputError for ranges that are no lengths."""
     _Structure(path.read_bytes()).check()
-    return paired(_directions(path, gwyfile.load(str(path))))
-
-
-def _directions(path: Path, container: Mapping[str, Any]) -> Iterator[Direction]:
-    numbers = sorted(int(found[1]) for key in container if (found := FIELD.fullmatch(key)))
-    for number in numbers:
+    container = gwyfile.load(str(path))
+    for number in sorted(int(found[1]) for key in container if (found := FIELD.fullmatch(key))):
         field = container[f"/{number}/data"]
         title = str(container.get(f"/{number}/data/title", f"Channel {number}"))
-        lateral = _unit(field.si_unit_xy)
         range_x, range_y = (
-            metres(path, f"the range of '{title}'", float(length), lateral)
+            metres(f"the range of '{title}'", float(length), _unit(field.si_unit_xy))
             for length in (field.xreal, field.yreal)
         )
-        values, unit = in_si(np.asarray(field.data, dtype=float)[::-1], _unit(field.si_unit_z))
-        meta = container.get(f"/{number}/meta", {})
-        yield Direction(title, unit, facts_of(path, ScanFacts(range_x, range_y), meta), values)
+        facts = facts_of(range_x, range_y, container.get(f"/{number}/meta", {}))
+        rows = np.asarray(field.data, dtype=float)[::-1]
+        yield Direction(*split_title(title), _unit(field.si_unit_z), facts, rows)
 
 
 def _unit(found: Mapping[str, Any] | None) -> str:
     return "" if found is None else str(found["unitstr"])
 
 
-def write(
+def write_gwy(
+    gwyfile: ModuleType,
     targets: Sequence[Path],
     channels: Sequence[ImageChannel],
     stated: Mapping[str, str],
-    signals: Sequence[Signal],
 ) -> None:
-    """Write the file; raises InputError for signals, and for words with a zero byte."""
+    """Write the file; raises InputError for words with a zero byte."""
     (path,) = targets
-    if signals:
-        raise InputError(f"{path}: a Gwyddion file holds no signals: write them to .nc or .csv")
     for words in (*stated.items(), *((each.name, each.unit) for each in channels)):
         if "\0" in "".join(words):
             raise InputError(f"{path}: '{words[0]}' holds a zero byte: leave it out")
-    container = GwyContainer()
+    parts = gwyfile.objects
+    container = parts.GwyContainer()
     for number, channel in enumerate(channels):
-        container[f"/{number}/data"] = _data_field(channel)
+        container[f"/{number}/data"] = parts.GwyDataField(
+            np.ascontiguousarray(channel.values[::-1], dtype=np.float64),
+            xreal=channel.range_x,
+            yreal=channel.range_y,
+            xoff=channel.left,
+            yoff=channel.bottom,
+            si_unit_xy="m",
+            si_unit_z=channel.unit,
+        )
         container[f"/{number}/data/title"] = channel.title
         container.typecodes[f"/{number}/data/title"] = TEXT
-        container[f"/{number}/meta"] = GwyContainer(dict(stated), dict.fromkeys(stated, TEXT))
+        container[f"/{number}/meta"] = parts.GwyContainer(dict(stated), dict.fromkeys(stated, TEXT))
     with replacing(path) as beside:
         container.tofile(str(beside))
-
-
-def _data_field(channel: ImageChannel) -> GwyDataField:
-    return GwyDataField(
-        np.ascontiguousarray(channel.values[::-1], dtype=np.float64),
-        xreal=channel.range_x,
-        yreal=channel.range_y,
-        xoff=channel.left,
-        yoff=channel.bottom,
-        si_unit_xy="m",
-        si_unit_z=channel.unit,
-    )
 
 
 @define
