@@ -44,7 +44,7 @@ class Format:
 
 FORMATS = {
     ".nid": Format("Nanosurf image", "NSFopen.read", nanosurf.read),
-    ".gwy": Format("Gwyddion file", "gwyfile", gwyddion.read_gwy),
+    ".gwy": Format("Gwyddion file", "numpy", gwyddion.read_gwy),
     ".gsf": Format("Gwyddion Simple Field", "gsffile", gwyddion.read_gsf),
     ".spm": Format("Bruker Nanoscope image", "pySPM", instruments.read_spm),
     ".ibw": Format("Asylum Research image", "igor2.binarywave", instruments.read_ibw),
@@ -67,7 +67,8 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
         path: a file of Nanosurf (``.nid``), Gwyddion (``.gwy``, ``.gsf``), Bruker (``.spm``),
             Asylum Research (``.ibw``) or Nanonis (``.sxm``), or an ``.npz`` file. The latter holds
             the arrays ``trace`` and ``retrace``, and ``range_x`` and ``range_y`` in m. It may hold
-            the other fields of ``ScanImage``. All others need the extra ``images``.
+            the other fields of ``ScanImage``. All but ``.gwy`` and ``.npz`` need the extra
+            ``images``.
         channel: its name in the file without its direction, as ``Topography``. By default the
             first channel of the height that has both directions.
 

@@ -1,4 +1,4 @@
-"""Images of Gwyddion: ``.gwy`` by the package gwyfile, and ``.gsf`` by the package gsffile.
+"""Images of Gwyddion, ``.gwy`` and ``.gsf``; the latter by the package gsffile.
 
 Both formats begin with the top row, at the highest y: Gwyddion's manual, "Gwyddion native format"
 and "Gwyddion Simple Field". Columns begin at the lowest x, also in a retrace, since Gwyddion
@@ -7,7 +7,8 @@ of this package state both: in the metadata of each channel, and as further fiel
 
 A ``.gsf`` file holds one channel in one direction, of 32 bits. In a ``.gwy`` file, an object is a
 name, a size and components, and a component a name, a letter for its type and its data. gwyfile
-may never return from a file whose sizes are damaged, so they are checked before.
+writes them. It is not used to read them: it never returns from some files whose sizes are damaged,
+and it copies the rest of a file for each component.
 """
 
 import re
@@ -34,8 +35,10 @@ FIELD = re.compile(r"/(\d+)/data")
 TEXT = "s"
 """Code of gwyfile for text, which it would take for a single character where it has one."""
 MAGIC = b"GWYP"
-SIZES = {"b": 1, "c": 1, "i": 4, "q": 8, "d": 8}
-"""Bytes of a number, by the letter of its type; its capital stands for an array of them."""
+NUMBERS: dict[str, np.dtype[Any]] = {"b": np.dtype("?"), "c": np.dtype("u1")}
+NUMBERS |= {"i": np.dtype("<i4"), "q": np.dtype("<i8"), "d": np.dtype("<f8")}
+"""Numbers by the letters of their types; a capital stands for an array of them."""
+NO_UNIT = {"unitstr": ""}
 COUNT = struct.Struct("<I")
 DEEPEST = 20
 """Objects within objects; a channel's unit is the third."""
@@ -90,24 +93,20 @@ def _fields(channel: ImageChannel) -> dict[str, str]:
     }
 
 
-def read_gwy(gwyfile: ModuleType, path: Path) -> Iterator[Direction]:
+def read_gwy(_: ModuleType, path: Path) -> Iterator[Direction]:
     """Read all channels; raises InputError for ranges that are no lengths."""
-    _Structure(path.read_bytes()).check()
-    container = gwyfile.load(str(path))
+    container = _GwyParts(path.read_bytes()).container()
     for number in sorted(int(found[1]) for key in container if (found := FIELD.fullmatch(key))):
         field = container[f"/{number}/data"]
         title = str(container.get(f"/{number}/data/title", f"Channel {number}"))
+        lateral, unit = (str(field.get(f"si_unit_{of}", NO_UNIT)["unitstr"]) for of in ("xy", "z"))
         range_x, range_y = (
-            metres(f"the range of '{title}'", float(length), _unit(field.si_unit_xy))
-            for length in (field.xreal, field.yreal)
+            metres(f"the range of '{title}'", float(field[key]), lateral)
+            for key in ("xreal", "yreal")
         )
         facts = facts_of(range_x, range_y, container.get(f"/{number}/meta", {}))
-        rows = np.asarray(field.data, dtype=float)[::-1]
-        yield Direction(*split_title(title), _unit(field.si_unit_z), facts, rows)
-
-
-def _unit(found: Mapping[str, Any] | None) -> str:
-    return "" if found is None else str(found["unitstr"])
+        rows = field["data"].reshape(field["yres"], field["xres"])[::-1]
+        yield Direction(*split_title(title), unit, facts, np.asarray(rows, dtype=float))
 
 
 def write_gwy(
@@ -141,8 +140,8 @@ def write_gwy(
 
 
 @define
-class _Structure:
-    """The parts of a file; methods return where a part ends that begins at ``start``.
+class _GwyParts:
+    """The parts of a file; methods return what begins at ``start``, and where it ends.
 
     They raise ValueError where it would end beyond ``stop``, and for too many parts.
     """
@@ -150,50 +149,51 @@ class _Structure:
     content: bytes
     parts: int = 0
 
-    def check(self) -> None:
-        """Raise ValueError where a file does not begin as one, or a part ends elsewhere."""
+    def container(self) -> dict[str, Any]:
+        """Return the components of a file by their names, those of objects within it likewise."""
         if not self.content.startswith(MAGIC):
             raise ValueError(f"it does not begin with {MAGIC.decode()}")
-        end = self._object(len(MAGIC), len(self.content), DEEPEST)
+        found, end = self._object(len(MAGIC), len(self.content), DEEPEST)
         if end != len(self.content):
             raise ValueError(f"{len(self.content) - end} bytes follow what it states")
+        return found
 
-    def _object(self, start: int, stop: int, depth: int) -> int:
+    def _object(self, start: int, stop: int, depth: int) -> tuple[dict[str, Any], int]:
         if not depth:
             raise ValueError(f"objects lie more than {DEEPEST} deep")
-        place = self._text(start, stop)
+        _, place = self._text(start, stop)
         size, place = self._count(place, stop)
         end = _within(place + size, stop)
+        found = {}
         while place < end:
-            place = self._component(place, end, depth - 1)
-        return end
+            name, place = self._text(place, end)
+            found[name], place = self._component(place, end, depth - 1)
+        return found, end
 
-    def _component(self, start: int, stop: int, depth: int) -> int:
-        place = self._text(start, stop)
-        kind, place = self.content[place : place + 1].decode("latin-1"), _within(place + 1, stop)
-        if kind in SIZES:
-            return _within(place + SIZES[kind], stop)
-        count = 1
-        if kind.isupper():
-            count, place = self._count(place, stop)
-        single = kind.lower()
-        if single in SIZES:
-            return _within(place + count * SIZES[single], stop)
-        if single not in ("s", "o"):
+    def _component(self, start: int, stop: int, depth: int) -> tuple[Any, int]:
+        kind, place = self.content[start : start + 1].decode("latin-1"), _within(start + 1, stop)
+        count, place = self._count(place, stop) if kind.isupper() else (1, place)
+        found: Any = []
+        if (number := NUMBERS.get(kind.lower())) is not None:
+            end = _within(place + count * number.itemsize, stop)
+            found, place = np.frombuffer(self.content, number, count, place), end
+        elif kind in "sSoO":
+            for _ in range(count):
+                text = kind in "sS"
+                each, place = self._text(place, stop) if text else self._object(place, stop, depth)
+                found.append(each)
+        else:
             raise ValueError(f"byte {place}: '{kind}' is no type")
-        for _ in range(count):
-            place = self._text(place, stop) if single == "s" else self._object(place, stop, depth)
-        return place
+        return found if kind.isupper() else found[0], place
 
-    def _text(self, start: int, stop: int) -> int:
-        """Return where the text ends, its zero included."""
+    def _text(self, start: int, stop: int) -> tuple[str, int]:
         self.parts += 1
         if self.parts > MOST_PARTS:
             raise ValueError(f"it has more than {MOST_PARTS} parts")
         end = self.content.find(b"\0", start, stop)
         if end < 0:
             raise ValueError(f"byte {start}: a text has no end")
-        return end + 1
+        return self.content[start:end].decode(), end + 1
 
     def _count(self, start: int, stop: int) -> tuple[int, int]:
         end = _within(start + COUNT.size, stop)

@@ -105,7 +105,7 @@ SXM_END, SXM_SAMPLES = re.compile(rb"^:SCANIT_END:\s*$", re.MULTILINE), b"\x1a\x
 """What ends the header and begins the samples."""
 PIXEL = 4
 """Bytes of a sample."""
-BOTH = {"both": ("forward", "backward")}
+WAYS = {"forward": ["forward"], "backward": ["backward"], "both": ["forward", "backward"]}
 
 
 def read_sxm(spm: ModuleType, path: Path) -> Iterator[Direction]:
@@ -121,15 +121,15 @@ def read_sxm(spm: ModuleType, path: Path) -> Iterator[Direction]:
     scan = spm.SXM(str(path))
     columns, *rows = scan.header["DATA_INFO"]
     held = len(content) - start - len(SXM_SAMPLES)
-    ways = sum(len(BOTH.get(row[3], (row[3],))) for row in rows)
+    ways = sum(len(WAYS[row[3]]) for row in rows)
     stated = PIXEL * ways * scan.size["pixels"]["x"] * scan.size["pixels"]["y"]
     if not 0 < stated <= held:
         raise InputError(f"states {stated} bytes of samples, {held} follow: copy it again")
     facts = _sxm_facts(scan.header)
     for row in rows:
         channel = dict(zip(columns, row, strict=False))
-        name, way = channel["Name"], channel["Direction"]
-        for each in BOTH.get(way, (way,)):
+        name = channel["Name"]
+        for each in WAYS[channel["Direction"]]:
             values = np.asarray(scan.get_channel(name, direction=each).pixels, dtype=float)
             upward = values if facts.upward else values[::-1]
             back = each == "backward"
