@@ -74,6 +74,16 @@ def test_rows_are_those_of_another_reader(tmp_path: Path, suffix: str, channel: 
     np.testing.assert_allclose(values, found, rtol=1e-6)
 
 
+def test_pixels_are_square_where_a_bruker_states_no_ratio(tmp_path: Path) -> None:
+    path = tmp_path / "captured.spm"
+    WRITERS[".spm"](path, pair(0, 12, 16))
+    other = b"Aspect Ratio: 0.516184"
+    content = re.sub(rb"Aspect Ratio: \S+", lambda it: other.ljust(len(it[0])), path.read_bytes())
+    path.write_bytes(content)
+    image = read_image(path)
+    assert image.range_y == pytest.approx(image.range_x * 12 / 16)
+
+
 def npz(path: Path, **further: object) -> Path:
     rng = np.random.default_rng(0)
     given_ = {"trace": rng.normal(size=(9, 11)), "range_x": 2e-6, "range_y": 1e-6}

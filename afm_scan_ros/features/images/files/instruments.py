@@ -8,7 +8,9 @@ are damaged, so both are checked before.
 pySPM's rows round to have the top first. The columns of a retrace run from the lowest x, as
 Nanoscope shows them: neither AFMReader nor Gwyddion turns them. ``Scan Rate`` counts lines a
 second, trace and retrace each. ``Scan Size`` is the range in x, and ``Aspect Ratio`` that of x to
-y. ``Frame direction`` is the slow direction.
+y, as ``2:1``. A scan that was captured before its end states a single number that is not the ratio:
+Nanoscope shows 300 by 210 nm for 512 by 358 pixels and ``0.516184`` (issue 38 of pySPM). Its pixels
+are taken as square, as by pySPM. ``Frame direction`` is the slow direction.
 
 ``.sxm``: samples are stored in the order of their acquisition. Of a scan with ``SCAN_DIR`` down the
 first row is therefore the highest, and the columns of ``backward`` run from the highest x.
@@ -84,10 +86,12 @@ def read_spm(spm: ModuleType, path: Path) -> Iterator[Direction]:
 
 def _spm_facts(layer: Layer, line_time: float | None) -> ScanFacts:
     size, _, unit = _text(layer, "Scan Size").split()
-    width, height = (float(word) for word in _text(layer, "Aspect Ratio").split(":"))
+    width, colon, height = _text(layer, "Aspect Ratio").partition(":")
+    if not colon:
+        height, width = _text(layer, "Number of lines"), _text(layer, "Samps/line")
     range_x = metres("Scan Size", float(size), unit.replace("~", "u"))
     upward = UPWARD.get(_text(layer, "Frame direction").lower())
-    return ScanFacts(range_x, range_x * height / width, line_time, upward)
+    return ScanFacts(range_x, range_x * float(height) / float(width), line_time, upward)
 
 
 def _text(layer: Layer, name: str) -> str:
