@@ -15,7 +15,7 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, refuse_gaps
 from afm_scan_ros.files.units import METRES, in_ascii
 
 HEIGHT = re.compile(r"topo|height|z.?axis|z.?sensor|^z\b", re.IGNORECASE)
@@ -198,12 +198,7 @@ class ImageChannel:
     def __attrs_post_init__(self) -> None:
         if self.values.ndim != 2 or not self.values.size:  # noqa: PLR2004 - a plane
             raise InputError(f"{self.title}: an image of shape {self.values.shape}: give a plane")
-        if not np.all(np.isfinite(self.values)):
-            line, pixel = (int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
-            raise InputError(
-                f"{self.title}: not a finite number in line {line}, pixel {pixel}: give an image"
-                " without gaps"
-            )
+        refuse_gaps(f"{self.title}:", self.values)
 
     @property
     def title(self) -> str:
