@@ -84,8 +84,10 @@ def _written(
         write_signals(target, signals)
         return (target,), (), signals
     signals = _signals(recording, list(SIGNALS)) if suffix == NETCDF else ()
-    imaged = suffix != NETCDF or _has_lines(recording)
-    channels = _channels(recording, pixels) if imaged else ()
+    spec = recording.info.spec
+    lines = recording.stated and spec is not None and spec.pattern in TO_AND_FRO
+    imaged = suffix != NETCDF or lines
+    channels = scan_channels(recording, scan_spec(recording), pixels) if imaged else ()
     missing = [name for name in STREAMS if name not in recording.topics]
     if imaged and missing:
         without = f"{recording.path}: holds no {' and no '.join(missing)}"
@@ -93,15 +95,6 @@ def _written(
             raise InputError(f"{without}: record it too, or export signals to .nc or .csv")
         warn([f"{without}, so there are no images of errors and positions"])
     return write_image(target, channels, _stated(recording), signals), channels, signals
-
-
-def _has_lines(recording: ScanRecording) -> bool:
-    spec = recording.info.spec
-    return recording.stated and spec is not None and spec.pattern in TO_AND_FRO
-
-
-def _channels(recording: ScanRecording, pixels: int | None) -> tuple[ImageChannel, ...]:
-    return scan_channels(recording, scan_spec(recording), pixels)
 
 
 def _shortcomings(

@@ -8,11 +8,15 @@ from attrs import evolve
 
 from afm_scan_ros.cli.options import FILE, FOLDER, NEW_FILE, positive, refuse_existing, working
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.features.images.corrected_image import correction_figure
 from afm_scan_ros.features.images.files.channels import image_channels, words_of
 from afm_scan_ros.features.images.files.formats import WRITTEN, read_image, write_image
 from afm_scan_ros.features.images.identify import ACCURACY, correct_image, identify_from_images
-from afm_scan_ros.features.images.report import grating_table, left_out, not_separated
+from afm_scan_ros.features.images.report import (
+    correction_figure,
+    grating_table,
+    left_out,
+    not_separated,
+)
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.scan_figures import save

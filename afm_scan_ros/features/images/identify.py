@@ -19,8 +19,7 @@ from afm_scan_ros.features.images.grating.registered_image import (
     both_directions,
     register_image,
 )
-from afm_scan_ros.features.images.predicted import predicted_positions
-from afm_scan_ros.features.images.regrid import common_rectangle, regridded
+from afm_scan_ros.features.images.positions import common_rectangle, predicted_positions, regridded
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.model import Model
 

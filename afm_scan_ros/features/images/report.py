@@ -1,19 +1,20 @@
-"""What images of a grating show of a scanner: a table of figures, and a picture."""
+"""What images of a grating show of a scanner: a table of figures, and pictures."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.model import BaseEffects, Status
-from afm_scan_ros.core.types import AXES
+from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.features.images.grating.features import levelled
 from afm_scan_ros.features.images.grating.models import APART, Positions
 from afm_scan_ros.features.images.grating.motion import middles
 from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
 from afm_scan_ros.features.images.grating.rough_motion import FINEST
 from afm_scan_ros.features.images.scan_image import ScanImage
-from afm_scan_ros.report.style import BLUE, MICRO, ORANGE, blank, styled, zero_line
+from afm_scan_ros.report.style import BLUE, MICRO, NANO, ORANGE, blank, styled, zero_line
 from afm_scan_ros.report.table import Row, Table
 
 COLUMNS = {
@@ -30,6 +31,14 @@ FASTER = 10.0
 TOGETHER = "upwards and downwards"
 MEANS = {"x": "lines", "y": "pixels of a line"}
 """What the motion of an axis is the mean over."""
+SHOWN = 1.0, 99.0
+"""Percentiles of the values at which the colours end, so that a spike does not hide the rest."""
+ROWS = "as recorded", "corrected"
+SIDES = "trace", "retrace", "trace minus retrace"
+PANEL = 2.9
+"""Width of a panel in inches."""
+AROUND = 1.7
+"""Height of titles, labels and colour bars in inches."""
 
 
 def grating_table(
@@ -132,3 +141,50 @@ def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]
             panel.set_title(f"{name}: {axis}, mean over the {MEANS[axis]}")
             panel.legend()
     return figure
+
+
+@styled
+def correction_figure(title: str, before: ScanImage, after: ScanImage) -> Figure:
+    """Draw trace, retrace and their difference of an image, before and after its correction.
+
+    The parabola in x and y that fits an image best is subtracted. Both rows have the same colours.
+    Both images hold a retrace.
+    """
+    images = before, after
+    height = len(ROWS) * PANEL * before.range_y / before.range_x + AROUND
+    figure = blank(9.6, height, title)
+    panels = figure.subplots(len(ROWS), len(SIDES))
+    right = MICRO * max(before.range_x, after.range_x)
+    top = MICRO * max(before.range_y, after.range_y)
+    factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
+    rows = [_images(image, factor) for image in images]
+    least, most = _percentiles(values for row in rows for values in row[:2])
+    widest = _percentiles(np.abs(row[2]) for row in rows)[1]
+    colours = [("afmhot", least, most)] * 2 + [("RdBu_r", -widest, widest)]
+    shown = []
+    for (row, column), panel in np.ndenumerate(panels):
+        x, y = MICRO * images[row].range_x, MICRO * images[row].range_y
+        cmap, low, high = colours[column]
+        place = {"extent": (0.0, x, 0.0, y), "origin": "lower"}
+        shown.append(panel.imshow(rows[row][column], cmap=cmap, vmin=low, vmax=high, **place))
+        panel.set(xlim=(0.0, right), ylim=(0.0, top), xlabel="x in µm", ylabel="y in µm")
+        panel.set_title(f"{SIDES[column]}, {ROWS[row]}")
+        panel.label_outer()
+    for drawn, of, what in (
+        (shown[0], panels[:, :2], f"{before.channel} without its parabola"),
+        (shown[2], panels[:, 2:], "trace minus retrace"),
+    ):
+        figure.colorbar(
+            drawn, ax=of, label=f"{what}, {unit}", location="bottom", extend="both", aspect=30
+        )
+    return figure
+
+
+def _images(image: ScanImage, factor: float) -> tuple[Array, Array, Array]:
+    trace, retrace = (factor * levelled(np.asarray(v)) for v in (image.trace, image.retrace))
+    return trace, retrace, trace - retrace
+
+
+def _percentiles(values: Iterable[Array]) -> tuple[float, float]:
+    low, high = np.percentile(np.concatenate([each.ravel() for each in values]), SHOWN)
+    return float(low), float(high)

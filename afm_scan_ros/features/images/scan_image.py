@@ -24,6 +24,15 @@ def _real(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
+def refuse_gaps(what: str, values: Array) -> None:
+    """Raise InputError on ``what`` where a value of an image is not a finite number."""
+    if not np.all(np.isfinite(values)):
+        line, pixel = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
+        raise InputError(
+            f"{what} not a finite number in line {line}, pixel {pixel}: give an image without gaps"
+        )
+
+
 @frozen(eq=False)
 class ScanImage:
     """One channel of one image: ``trace`` and ``retrace`` of the same lines, (lines, pixels) each.
@@ -70,12 +79,8 @@ class ScanImage:
                 " differ: give both of one scan"
             )
         for which, values in (("trace", self.trace), ("retrace", self.retrace)):
-            if values is not None and not np.all(np.isfinite(values)):
-                line, pixel = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
-                raise InputError(
-                    f"{self.name}: the {which} is not a finite number in line {line}, pixel"
-                    f" {pixel}: give an image without gaps"
-                )
+            if values is not None:
+                refuse_gaps(f"{self.name}: the {which} is", values)
 
     def _refuse_unpositive(self, name: str, unit: str) -> None:
         value = getattr(self, name)

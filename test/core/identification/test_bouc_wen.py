@@ -12,7 +12,7 @@ from afm_scan_ros.core.identification.joint.moving import LinearDynamics, Moving
 from afm_scan_ros.core.identification.joint.search import NO_CREEP
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.models import Positions, model_of
-from afm_scan_ros.features.images.predicted import LineDrive
+from afm_scan_ros.features.images.positions import LineDrive
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 ALPHA, BETA, GAMMA = 0.35, 1.2, 0.3

@@ -10,7 +10,7 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.models import Positions, model_of, positions_of
 from afm_scan_ros.features.images.grating.motion import MotionForm, Ripple, middles, spline_basis
 from afm_scan_ros.features.images.grating.registration import register
-from afm_scan_ros.features.images.regrid import common_rectangle, regridded
+from afm_scan_ros.features.images.positions import common_rectangle, regridded
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 SIZE, PITCH, RANGE = 128, 5e-6, 40e-6

@@ -4,9 +4,13 @@ import numpy as np
 from attrs import evolve
 from matplotlib.figure import Figure
 
-from afm_scan_ros.features.images.corrected_image import COLUMNS, ROWS, correction_figure
 from afm_scan_ros.features.images.grating.models import Positions
-from afm_scan_ros.features.images.report import deviation_figure
+from afm_scan_ros.features.images.report import (
+    ROWS,
+    SIDES,
+    correction_figure,
+    deviation_figure,
+)
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 RNG = np.random.default_rng(1)
@@ -16,7 +20,7 @@ IMAGE = ScanImage(TRACE, RETRACE, 48e-6, 64e-6, line_time=1.0, name="some/where/
 
 def colours(figure: Figure) -> list[tuple[float, float]]:
     drawn = [image for axes in figure.axes for image in axes.get_images()]
-    assert len(drawn) == len(ROWS) * len(COLUMNS)
+    assert len(drawn) == len(ROWS) * len(SIDES)
     return [image.get_clim() for image in drawn]
 
 
@@ -31,7 +35,7 @@ def test_a_spike_does_not_set_the_colours() -> None:
 def test_before_and_after_have_the_same_colours() -> None:
     after = evolve(IMAGE, trace=3.0 * TRACE, retrace=3.0 * TRACE)
     found = colours(correction_figure("cells", IMAGE, after))
-    assert found[: len(COLUMNS)] == found[len(COLUMNS) :]
+    assert found[: len(SIDES)] == found[len(SIDES) :]
     assert found[0] == found[1]
     assert found[2][0] == -found[2][1]
 

@@ -12,7 +12,7 @@ from afm_scan_ros.features.images.grating.registered_image import (
     RegisteredImage,
     both_directions,
 )
-from afm_scan_ros.features.images.predicted import PER_PIXEL, LineDrive
+from afm_scan_ros.features.images.positions import PER_PIXEL, LineDrive
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 SIZE, RANGE = 128, 40e-6

@@ -74,6 +74,16 @@ def test_rows_are_those_of_another_reader(tmp_path: Path, suffix: str, channel: 
     np.testing.assert_allclose(values, found, rtol=1e-6)
 
 
+def test_pixels_are_square_where_a_bruker_states_no_ratio(tmp_path: Path) -> None:
+    path = tmp_path / "captured.spm"
+    WRITERS[".spm"](path, pair(0, 12, 16))
+    other = b"Aspect Ratio: 0.516184"
+    content = re.sub(rb"Aspect Ratio: \S+", lambda it: other.ljust(len(it[0])), path.read_bytes())
+    path.write_bytes(content)
+    image = read_image(path)
+    assert image.range_y == pytest.approx(image.range_x * 12 / 16)
+
+
 def npz(path: Path, **further: object) -> Path:
     rng = np.random.default_rng(0)
     given_ = {"trace": rng.normal(size=(9, 11)), "range_x": 2e-6, "range_y": 1e-6}
@@ -100,19 +110,16 @@ def test_arrays_need_no_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert read_image(npz(tmp_path / "a.npz")).trace.shape == (9, 11)
 
 
-@pytest.mark.parametrize("suffix", [s for s in FORMATS if s != ".npz"])
+@pytest.mark.parametrize("suffix", [s for s in FORMATS if FORMATS[s].needed != "numpy"])
 def test_a_missing_package_is_named(
     suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known = FORMATS[suffix]
-    monkeypatch.delitem(
-        sys.modules, f"afm_scan_ros.features.images.files.{known.module}", raising=False
-    )
-    for name in [n for n in sys.modules if n.split(".")[0] == known.package]:
+    package = FORMATS[suffix].needed.split(".")[0]
+    for name in [n for n in sys.modules if n.split(".")[0] == package]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, known.package, None)
+    monkeypatch.setitem(sys.modules, package, None)
     (tmp_path / f"a{suffix}").write_bytes(b"")
-    said = rf"a{suffix}: {known.package} is needed .*: pip install 'afm_scan_ros\[images\]'$"
+    said = rf"a{suffix}: {package} is needed .*: pip install 'afm_scan_ros\[images\]'$"
     with pytest.raises(InputError, match=said):
         read_image(tmp_path / f"a{suffix}")
 
@@ -141,7 +148,7 @@ def listed(*titles: str, units: Sequence[str] = ()) -> list[Direction]:
     """Return directions whose values are their numbers in the list."""
     every = [*units, *("m",) * (len(titles) - len(units))]
     return [
-        Direction(title, unit, FACTS, np.full((8, 9), float(number)))
+        Direction(*split_title(title), unit, FACTS, np.full((8, 9), float(number)))
         for number, (title, unit) in enumerate(zip(titles, every, strict=True))
     ]
 
@@ -161,27 +168,27 @@ CHOICES = [
 def test_the_height_with_both_directions(
     titles: tuple[str, ...], expected: tuple[str, int, int | None]
 ) -> None:
-    channel = chosen(PATH, paired(listed(*titles)), None)
-    sides = [None if side is None else side[0, 0] for side in (channel.trace, channel.retrace)]
-    assert (channel.name, *sides) == expected
+    image = image_of(PATH, chosen(paired(listed(*titles)), None))
+    retrace = None if image.retrace is None else image.retrace[0, 0]
+    assert (image.channel, image.trace[0, 0], retrace) == expected
 
 
 def test_a_title_that_comes_again_is_another_channel() -> None:
     found = paired(listed("Z trace", "Z retrace", "Z retrace", "Z trace", "Z trace"))
-    names = [(each.name, each.trace is not None, each.retrace is not None) for each in found]
-    assert names == [("Z", True, True), ("Z (2)", True, True), ("Z (3)", True, False)]
-    assert chosen(PATH, found, "z (2)").trace[0, 0] == 3
+    names = {name: sorted(sides) for name, sides in found.items()}
+    assert names == {"Z": [False, True], "Z (2)": [False, True], "Z (3)": [False]}
+    assert chosen(found, "z (2)")[False].values[0, 0] == 3
 
 
 def test_a_height_in_another_unit_is_none() -> None:
     found = paired(listed("Height trace", "Phase trace", units=["V", "deg"]))
     with pytest.raises(InputError, match="named as a height in m: give one of 'Height', 'Phase'"):
-        chosen(PATH, found, None)
-    assert chosen(PATH, found, "Height").unit == "V"
+        chosen(found, None)
+    assert chosen(found, "Height")[False].unit == "V"
 
 
 def test_what_is_stated_of_the_scan() -> None:
-    image = image_of(PATH, paired(listed("Height"))[0])
+    image = image_of(PATH, paired(listed("Height"))["Height"])
     facts = (image.range_x, image.range_y, image.line_time, image.upward, image.overscan)
     assert facts == (2e-6, 1e-6, 0.5, False, 0.0)
     assert (image.name, image.assumptions) == ("scan.gwy", ())

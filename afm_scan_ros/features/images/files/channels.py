@@ -5,7 +5,8 @@ values.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, refuse_gaps
 from afm_scan_ros.files.units import METRES, in_ascii
 
 HEIGHT = re.compile(r"topo|height|z.?axis|z.?sensor|^z\b", re.IGNORECASE)
@@ -45,150 +46,125 @@ class ScanFacts:
 
 
 @frozen(eq=False)
-class FoundChannel:
-    """A channel: row 0 of both arrays has the lowest y, column 0 the lowest x.
+class Direction:
+    """One direction of one channel as a file holds it; ``back`` marks the retrace.
 
-    Both are of shape (lines, pixels), None where the file does not hold that direction.
+    Row 0 of ``values`` (lines, pixels) has the lowest y, column 0 the lowest x, also in a retrace.
     """
 
     name: str
-    unit: str
-    facts: ScanFacts
-    trace: Array | None
-    retrace: Array | None
-
-
-@frozen(eq=False)
-class Direction:
-    """One direction of one channel as a file lists them, with the title that it has there."""
-
-    title: str
+    back: bool
     unit: str
     facts: ScanFacts
     values: Array
 
 
-def paired(found: Iterable[Direction]) -> list[FoundChannel]:
-    """Put trace and retrace of the same channel together, by their titles.
-
-    A title that states no direction is a trace. A title that comes again is another channel.
-    """
-    pairs: dict[str, dict[bool, Direction]] = {}
-    for each in found:
-        name, back = split_title(each.title)
-        number = 1
-        while back in pairs.get(_numbered(name, number), {}):
-            number += 1
-        pairs.setdefault(_numbered(name, number), {})[back] = each
-    return [_channel(name, sides) for name, sides in pairs.items()]
+Sides = dict[bool, Direction]
+"""Trace and retrace of one channel, by ``back``, as far as a file holds them."""
 
 
 def split_title(title: str) -> tuple[str, bool]:
-    """Return a title without its direction, and whether that is the retrace."""
+    """Return a title without its direction, and whether that is the retrace.
+
+    A title that states no direction is a trace.
+    """
     end = DIRECTION.search(title)
     name = "" if end is None else title[: end.start()].rstrip(OPENING)
     return (title, False) if end is None or not name else (name, end["back"] is not None)
 
 
-def _numbered(name: str, number: int) -> str:
-    return name if number == 1 else f"{name} ({number})"
+def paired(found: Iterable[Direction]) -> dict[str, Sides]:
+    """Put trace and retrace together by the names of their channels.
+
+    A name that comes again in one direction is another channel, whose name has a number.
+    """
+    pairs: dict[str, Sides] = {}
+    for each in found:
+        names = (each.name if number == 1 else f"{each.name} ({number})" for number in count(1))
+        name = next(name for name in names if each.back not in pairs.get(name, {}))
+        pairs.setdefault(name, {})[each.back] = evolve(each, name=name)
+    return pairs
 
 
-def _channel(name: str, sides: dict[bool, Direction]) -> FoundChannel:
-    trace, retrace = sides.get(False), sides.get(True)
-    one = trace or sides[True]
-    return FoundChannel(
-        name,
-        one.unit,
-        one.facts,
-        None if trace is None else trace.values,
-        None if retrace is None else retrace.values,
-    )
-
-
-def chosen(path: Path, channels: Sequence[FoundChannel], wanted: str | None) -> FoundChannel:
+def chosen(channels: Mapping[str, Sides], wanted: str | None) -> Sides:
     """Return a channel by its name, whatever the case of its letters; else that of the height.
 
     Where several hold the height, the first with both directions is taken; an only channel is
     taken whatever its name. Raises InputError naming the channels that are there.
     """
-    names = ", ".join(f"'{channel.name}'" for channel in channels)
+    names = ", ".join(f"'{name}'" for name in channels)
     if wanted is not None:
-        fitting = [each for each in channels if each.name.lower() == wanted.lower()]
-        if not fitting:
-            raise InputError(f"{path}: no channel '{wanted}': give one of {names or 'none'}")
-        return fitting[0]
-    heights = [each for each in channels if each.unit == METRE and HEIGHT.search(each.name)]
-    both = [each for each in heights if each.trace is not None and each.retrace is not None]
-    traces = [each for each in heights if each.trace is not None]
-    for candidates in (both, traces, heights, channels if len(channels) == 1 else []):
-        if candidates:
-            return candidates[0]
-    raise InputError(f"{path}: no channel is named as a height in m: give one of {names or 'none'}")
+        for name, sides in channels.items():
+            if name.lower() == wanted.lower():
+                return sides
+        raise InputError(f"no channel '{wanted}': give one of {names or 'none'}")
+    lengths = {name: sides for name, sides in channels.items() if _is_length(_unit(sides))}
+    heights = [sides for name, sides in lengths.items() if HEIGHT.search(name)]
+    if not heights and len(channels) != 1:
+        raise InputError(f"no channel is named as a height in m: give one of {names or 'none'}")
+    return max(heights or channels.values(), key=lambda sides: (False in sides, len(sides)))
 
 
-def image_of(path: Path, channel: FoundChannel) -> ScanImage:
-    """Return the image of a channel; raises InputError where its trace is not in the file."""
-    if channel.trace is None:
+def _unit(sides: Sides) -> str:
+    return (sides[False] if False in sides else sides[True]).unit
+
+
+def image_of(path: Path, sides: Sides) -> ScanImage:
+    """Return the image of a channel, lengths in m; raises InputError where its trace is missing."""
+    if False not in sides:
         raise InputError(
-            f"{path}: holds only the retrace of '{channel.name}': save its trace as well"
+            f"{path}: holds only the retrace of '{sides[True].name}': save its trace as well"
         )
-    facts = channel.facts
+    trace, retrace = sides[False], sides.get(True)
+    facts = trace.facts
+    assumptions = []
+    if facts.upward is None:
+        assumptions.append(f"{path}: states no slow direction: it is taken as scanned upward")
+    if facts.overscan is None:
+        assumptions.append(f"{path}: states no overscan: it is taken as none")
     return ScanImage(
-        channel.trace,
-        channel.retrace,
+        _in_si(trace),
+        None if retrace is None else _in_si(retrace),
         facts.range_x,
         facts.range_y,
         facts.line_time,
         upward=facts.upward is not False,
         overscan=facts.overscan or 0.0,
-        channel=channel.name,
-        unit=channel.unit,
+        channel=trace.name,
+        unit=METRE if _is_length(trace.unit) else trace.unit,
         name=str(path),
-        assumptions=tuple(_assumptions(path, facts)),
+        assumptions=tuple(assumptions),
     )
 
 
-def _assumptions(path: Path, facts: ScanFacts) -> list[str]:
-    found = []
-    if facts.upward is None:
-        found.append(f"{path}: states no slow direction: it is taken as scanned upward")
-    if facts.overscan is None:
-        found.append(f"{path}: states no overscan: it is taken as none")
-    return found
+def _in_si(side: Direction) -> Array:
+    return np.multiply(side.values, METRES.get(in_ascii(side.unit), 1.0))
 
 
-def metres(path: Path, what: str, value: float, unit: str) -> float:
+def _is_length(unit: str) -> bool:
+    return in_ascii(unit) in METRES
+
+
+def metres(what: str, value: float, unit: str) -> float:
     """Return a length in m; raises InputError for a unit that is none of length."""
-    if in_ascii(unit) not in METRES:
-        raise InputError(f"{path}: {what} is in '{unit}', not in a unit of length: save it in m")
+    if not _is_length(unit):
+        raise InputError(f"{what} is in '{unit}', not in a unit of length: save it in m")
     return value * METRES[in_ascii(unit)]
 
 
-def in_si(values: Array, unit: str) -> tuple[Array, str]:
-    """Return lengths in m, and all other quantities as they are."""
-    factor = METRES.get(in_ascii(unit))
-    return (values, unit) if factor is None else (np.multiply(values, factor), METRE)
-
-
-def facts_of(path: Path, facts: ScanFacts, stated: Mapping[str, str]) -> ScanFacts:
-    """Add what is stated; raises InputError for what is no number, or no direction."""
+def facts_of(range_x: float, range_y: float, stated: Mapping[str, str]) -> ScanFacts:
+    """Return what words state of a scan; raises InputError for no number, or no direction."""
     direction = stated.get(SLOW_DIRECTION)
     if direction is not None and direction not in UPWARD:
-        raise InputError(f"{path}: {SLOW_DIRECTION} is '{direction}': state up or down")
-    return evolve(
-        facts,
-        line_time=_number(path, LINE_TIME, stated),
-        upward=None if direction is None else UPWARD[direction],
-        overscan=_number(path, OVERSCAN, stated),
-    )
-
-
-def _number(path: Path, key: str, stated: Mapping[str, str]) -> float | None:
-    try:
-        return float(stated[key]) if key in stated else None
-    except ValueError:
-        raise InputError(f"{path}: {key} is '{stated[key]}': state a number") from None
+        raise InputError(f"{SLOW_DIRECTION} is '{direction}': state up or down")
+    numbers: dict[str, float] = {}
+    for key in (LINE_TIME, OVERSCAN):
+        try:
+            numbers |= {key: float(stated[key])} if key in stated else {}
+        except ValueError:
+            raise InputError(f"{key} is '{stated[key]}': state a number") from None
+    upward = None if direction is None else UPWARD[direction]
+    return ScanFacts(range_x, range_y, numbers.get(LINE_TIME), upward, numbers.get(OVERSCAN))
 
 
 def words_of(image: ScanImage) -> dict[str, str]:
@@ -222,12 +198,7 @@ class ImageChannel:
     def __attrs_post_init__(self) -> None:
         if self.values.ndim != 2 or not self.values.size:  # noqa: PLR2004 - a plane
             raise InputError(f"{self.title}: an image of shape {self.values.shape}: give a plane")
-        if not np.all(np.isfinite(self.values)):
-            line, pixel = (int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
-            raise InputError(
-                f"{self.title}: not a finite number in line {line}, pixel {pixel}: give an image"
-                " without gaps"
-            )
+        refuse_gaps(f"{self.title}:", self.values)
 
     @property
     def title(self) -> str:

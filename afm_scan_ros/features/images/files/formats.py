@@ -1,59 +1,63 @@
 """Reads and writes an image in the format of the file's suffix."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.features.images.files.channels import ImageChannel, chosen, image_of
+from afm_scan_ros.features.images.files import arrays, gwyddion, instruments, nanosurf
+from afm_scan_ros.features.images.files.channels import ImageChannel, chosen, image_of, paired
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.files.columns import Signal
 from afm_scan_ros.files.paths import path_of
 
-HERE = "afm_scan_ros.features.images.files"
 INSTALL = "pip install 'afm_scan_ros[images]'"
+NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 @frozen
 class Format:
-    """The module here that knows a format, what it is, and the package that it needs, if any."""
+    """What a format is, the module that is needed, and what reads or writes it with that module.
 
-    module: str
+    Readers take the module and a path, and return each ``Direction``. Writers take the module,
+    paths, channels, words and signals. Both raise InputError for what the format cannot hold.
+    """
+
     what: str
-    package: str = ""
+    needed: str
+    run: Callable[..., Any]
 
-    def load(self, path: Path, verb: str) -> Any:  # noqa: ANN401 - each module has its functions
-        """Import the module; raises InputError where its package cannot be imported."""
+    def load(self, path: Path, verb: str) -> ModuleType:
+        """Import the module; raises InputError where it cannot be imported."""
         try:
-            return import_module(f"{HERE}.{self.module}")
+            return import_module(self.needed)
         except ImportError as error:
             raise InputError(
-                f"{path}: {self.package} is needed to {verb} a {self.what} and cannot be imported"
-                f" ({error}): {INSTALL}"
+                f"{path}: {self.needed.partition('.')[0]} is needed to {verb} a {self.what} and"
+                f" cannot be imported ({error}): {INSTALL}"
             ) from error
 
 
 FORMATS = {
-    ".nid": Format("nid", "Nanosurf image", "NSFopen"),
-    ".gwy": Format("gwy", "Gwyddion file", "gwyfile"),
-    ".gsf": Format("gsf", "Gwyddion Simple Field", "gsffile"),
-    ".spm": Format("spm", "Bruker Nanoscope image", "pySPM"),
-    ".ibw": Format("ibw", "Asylum Research image", "igor2"),
-    ".sxm": Format("sxm", "Nanonis image", "pySPM"),
-    ".npz": Format("npz", "archive of the arrays of an image"),
+    ".nid": Format("Nanosurf image", "NSFopen.read", nanosurf.read),
+    ".gwy": Format("Gwyddion file", "numpy", gwyddion.read_gwy),
+    ".gsf": Format("Gwyddion Simple Field", "gsffile", gwyddion.read_gsf),
+    ".spm": Format("Bruker Nanoscope image", "pySPM", instruments.read_spm),
+    ".ibw": Format("Asylum Research image", "igor2.binarywave", instruments.read_ibw),
+    ".sxm": Format("Nanonis image", "pySPM", instruments.read_sxm),
+    ".npz": Format("archive of the arrays of an image", "numpy", arrays.read_npz),
 }
 """Formats that are read, by suffix."""
 WRITTEN = {
-    ".gwy": FORMATS[".gwy"],
-    ".gsf": FORMATS[".gsf"],
-    ".nc": Format("netcdf", "netCDF-4 file", "h5netcdf"),
+    ".gwy": Format("Gwyddion file", "gwyfile", gwyddion.write_gwy),
+    ".gsf": Format("Gwyddion Simple Field", "gsffile", gwyddion.write_gsf),
+    ".nc": Format("netCDF-4 file", "h5netcdf", arrays.write_netcdf),
 }
 """Formats that are written, by suffix."""
-NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
@@ -63,7 +67,8 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
         path: a file of Nanosurf (``.nid``), Gwyddion (``.gwy``, ``.gsf``), Bruker (``.spm``),
             Asylum Research (``.ibw``) or Nanonis (``.sxm``), or an ``.npz`` file. The latter holds
             the arrays ``trace`` and ``retrace``, and ``range_x`` and ``range_y`` in m. It may hold
-            the other fields of ``ScanImage``. All others need the extra ``images``.
+            the other fields of ``ScanImage``. All but ``.gwy`` and ``.npz`` need the extra
+            ``images``.
         channel: its name in the file without its direction, as ``Topography``. By default the
             first channel of the height that has both directions.
 
@@ -80,14 +85,15 @@ def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
         raise InputError(f"{path}: no such file: give a file of an image")
     module = known.load(path, "read")
     try:
-        return image_of(path, chosen(path, module.read(path), channel))
-    except InputError:
-        raise
+        sides = chosen(paired(known.run(module, path)), channel)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error.__cause__
     except Exception as error:  # the packages raise whatever a damaged file makes them run into
         raise InputError(
             f"{path}: no {known.what} that can be read, it is damaged or cut short: copy or save"
             " it again"
         ) from error
+    return image_of(path, sides)
 
 
 def write_image(
@@ -115,6 +121,8 @@ def write_image(
         raise InputError(f"{path}: no format of images to write: give {', '.join(WRITTEN)}")
     if not channels and not signals:
         raise InputError(f"{path}: nothing to write: give at least one channel")
+    if signals and path.suffix.lower() != ".nc":
+        raise InputError(f"{path}: a {known.what} holds no signals: write them to .nc or .csv")
     module = known.load(path, "write")
     targets = _targets(path, channels)
     for number, target in enumerate(targets):
@@ -122,7 +130,7 @@ def write_image(
             raise InputError(f"{path}: two channels would be in {target.name}: rename one")
         if target.exists():
             raise InputError(f"{target} exists already: give another file or remove it")
-    module.write(targets, channels, stated, signals)
+    known.run(module, targets, channels, stated, *([signals] if signals else []))
     return targets
 
 
@@ -130,11 +138,6 @@ def _targets(path: Path, channels: Sequence[ImageChannel]) -> tuple[Path, ...]:
     """Return the files to be made: one, but for a format of one channel a file."""
     if path.suffix.lower() != ".gsf":
         return (path,)
-    others = (f"{path.stem}_{_plain(each.title)}{path.suffix}" for each in channels[1:])
-    return (path, *(path.with_name(name) for name in others))
-
-
-def _plain(title: str) -> str:
-    """Return a title as part of the name of a file: ``Error x (trace)`` is ``error_x_trace``."""
-    words = "".join(c if c.isalnum() else " " for c in title.lower()).split()
-    return "_".join(words)
+    words = ("".join(c if c.isalnum() else " " for c in each.title.lower()) for each in channels)
+    others = [f"{path.stem}_{'_'.join(title.split())}{path.suffix}" for title in words]
+    return (path, *(path.with_name(name) for name in others[1:]))

@@ -40,7 +40,7 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.types import Array, ProgressCallback
 from afm_scan_ros.features.images.grating.registration import Registration
-from afm_scan_ros.features.images.predicted import LineDrive, rows_of
+from afm_scan_ros.features.images.positions import LineDrive, rows_of
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 APART = 2.0

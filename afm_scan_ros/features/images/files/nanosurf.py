@@ -13,23 +13,14 @@ long. ``Overscan`` is stated in percent of the range, at each end.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-
-from NSFopen.read import nid_read
+from types import ModuleType
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
-from afm_scan_ros.features.images.files.channels import (
-    Direction,
-    FoundChannel,
-    ScanFacts,
-    in_si,
-    metres,
-    paired,
-)
+from afm_scan_ros.features.images.files.channels import UPWARD, Direction, ScanFacts, metres
 from afm_scan_ros.files.units import A_NUMBER, SECONDS
 
-FRAMES = {"Scan forward": ("Forward", "trace"), "Scan backward": ("Backward", "retrace")}
-"""Groups of the file, as NSFopen calls them, and the directions that they are."""
+FRAMES = {"Scan forward": ("Forward", False), "Scan backward": ("Backward", True)}
+"""Groups of the file, as NSFopen calls them, and whether they are the retrace."""
 HEADER_MARK = b"\n\r\n\r"
 """What NSFopen takes for the end of the header."""
 LONGEST, LARGEST = 2**14, 2**28
@@ -40,23 +31,29 @@ DATA_MARK = b"\r\n#!"
 QUANTITY = re.compile(rf"({A_NUMBER})\s*(\S*)")
 VECTOR = re.compile(r"[DV]\[([^],]*)(?:,[^]]*)?\]\*\[([^],]*)(?:,[^]]*)?\]")
 PERCENT = {"%": 0.01}
-UPWARD = {"Up": True, "Down": False}
 IMAGING = "DataSet\\Parameters\\Imaging"
 
 Sections = Mapping[str, Mapping[str, str]]
 
 
-def read(path: Path) -> Sequence[FoundChannel]:
+def read(nsfopen: ModuleType, path: Path) -> Iterator[Direction]:
     """Read all channels; raises InputError for a file cut short and a scan that was stopped."""
-    _check_header(path.read_bytes().partition(HEADER_MARK)[0])
-    found = nid_read(filename=str(path), dataframe=False)
+    content = path.read_bytes()
+    _check_header(content.partition(HEADER_MARK)[0])
+    found = nsfopen.nid_read(filename=str(path), dataframe=False)
     header: Sections = found.param["HeaderDump"]
     sections = list(_sections(header))
-    _refuse_cut(path, sections)
+    _refuse_cut(content, sections)
     images = found.data.get("Image")
     if not images:
-        raise InputError(f"{path}: holds no image, but other data: give a file of an image")
-    return paired(_directions(path, header, sections, images))
+        raise InputError("holds no image, but other data: give a file of an image")
+    for section in sections:
+        if section["Frame"] in FRAMES:
+            name = section["Dim2Name"]
+            group, back = FRAMES[section["Frame"]]
+            _refuse_stopped(section, header["DataSet-Info"].get("Scan direction", ""))
+            facts = _facts(header, section)
+            yield Direction(name, back, _unit(section, "Dim2"), facts, images[group][name])
 
 
 def _check_header(header: bytes) -> None:
@@ -78,51 +75,33 @@ def _sections(header: Sections) -> Iterator[Mapping[str, str]]:
                 yield header[stated[key]]
 
 
-def _refuse_cut(path: Path, sections: Sequence[Mapping[str, str]]) -> None:
+def _refuse_cut(content: bytes, sections: Sequence[Mapping[str, str]]) -> None:
     """Raise InputError for another number of bytes than stated: NSFopen counts from the end."""
-    content = path.read_bytes()
     there = len(content) - content.find(DATA_MARK) - len(DATA_MARK)
     bits = {int(each["SaveBits"]) for each in sections}
     stated = sum(int(e["Points"]) * int(e["Lines"]) * int(e["SaveBits"]) // 8 for e in sections)
     if DATA_MARK not in content or there != stated or len(bits) != 1:
         raise InputError(
-            f"{path}: its header states {stated} bytes of samples and {there} follow: it was cut"
-            " short or damaged, copy it again"
+            f"its header states {stated} bytes of samples and {there} follow: it was cut short or"
+            " damaged, copy it again"
         )
 
 
-def _directions(
-    path: Path,
-    header: Sections,
-    sections: Sequence[Mapping[str, str]],
-    images: Mapping[str, Mapping[str, Array]],
-) -> Iterator[Direction]:
-    for section in sections:
-        if section["Frame"] not in FRAMES:
-            continue
-        name = section["Dim2Name"]
-        group, direction = FRAMES[section["Frame"]]
-        _refuse_stopped(path, section, header["DataSet-Info"].get("Scan direction", ""))
-        values, unit = in_si(images[group][name], _unit(section, "Dim2"))
-        yield Direction(f"{name} {direction}", unit, _facts(path, header, section), values)
-
-
-def _refuse_stopped(path: Path, section: Mapping[str, str], direction: str) -> None:
+def _refuse_stopped(section: Mapping[str, str], direction: str) -> None:
     """Raise InputError where the row scanned last is not that of the end of a scan."""
     last = {"Up": int(section["Lines"]) - 1, "Down": 0}.get(direction)
     current = section.get("CurLine")
     if None not in (last, current) and int(str(current)) != last:
         raise InputError(
-            f"{path}: '{section['Dim2Name']}' was saved while its row {current} of"
-            f" {section['Lines']} was scanned: save a whole image"
+            f"'{section['Dim2Name']}' was saved while its row {current} of {section['Lines']} was"
+            " scanned: save a whole image"
         )
 
 
-def _facts(path: Path, header: Sections, section: Mapping[str, str]) -> ScanFacts:
-    info = header["DataSet-Info"]
-    imaging = header.get(IMAGING, {})
+def _facts(header: Sections, section: Mapping[str, str]) -> ScanFacts:
+    info, imaging = header["DataSet-Info"], header.get(IMAGING, {})
     range_x, range_y = (
-        metres(path, f"the range of {axis}", float(section[f"{dim}Range"]), _unit(section, dim))
+        metres(f"the range of {axis}", float(section[f"{dim}Range"]), _unit(section, dim))
         for axis, dim in (("x", "Dim0"), ("y", "Dim1"))
     )
     one_way = _number(imaging.get("ScanTime") or info.get("Time/Line", ""), SECONDS)
@@ -130,7 +109,7 @@ def _facts(path: Path, header: Sections, section: Mapping[str, str]) -> ScanFact
         range_x,
         range_y,
         None if one_way is None else 2.0 * one_way,
-        UPWARD.get(info.get("Scan direction", "")),
+        UPWARD.get(info.get("Scan direction", "").lower()),
         _number(imaging.get("OverScanSize") or info.get("Overscan", ""), PERCENT),
     )
 
