@@ -8,6 +8,7 @@ from typing import Protocol
 from afm_scan_ros.bag import scan_info
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import (
     ACHIEVED,
     DRIVE,

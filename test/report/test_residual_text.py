@@ -130,7 +130,7 @@ def test_what_is_not_white_may_yet_be_at_the_floor(healthy: Record) -> None:
 
 def test_records_that_are_no_scans_are_drawn_too(healthy: Record) -> None:
     evidence = evidence_of("x", default_model(), healthy)
-    described = describe(evidence, chain_of(default_model().x), evolve(healthy, spec=None))
+    described = describe(evidence, chain_of(default_model().x), evolve(healthy, scan=None))
     assert described.sides is None
     assert "preparation" not in " ".join(residual_text(described, evidence.limit))
     figure = residual_figure(evidence.limit, described, described)

@@ -8,31 +8,33 @@ import pytest
 from attrs import evolve
 from small_plans import PLANS
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.identification.records.recording import problems
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 from helpers.in_process import default_plant
 
-Record = tuple[Trace, Trace]
+Signals = tuple[Trace, Trace]
 PLACE, COUNT = 0.37, 113
 """Where in a record samples are spoilt, and how many."""
 LATE = 0.13
 """s"""
 
 
-def record(kind: str, plant: PlantSpec) -> Record:
+def record(kind: str, plant: PlantSpec) -> Signals:
     plan = PLANS[kind]
     drive = excitation_block(plan, 0, plan.total_samples)
     return drive, Piezoscanner(plant, plan.sample_period, 1).advance(drive)[0]
 
 
 @pytest.fixture(scope="module")
-def good() -> dict[str, Record]:
+def good() -> dict[str, Signals]:
     return {kind: record(kind, default_plant()) for kind in PLANS}
 
 
-def measured(change: Callable[[Array], Array]) -> Callable[[Trace, Trace], Record]:
+def measured(change: Callable[[Array], Array]) -> Callable[[Trace, Trace], Signals]:
     """Spoil what was measured of x."""
     return lambda drive, moved: (drive, evolve(moved, x=change(moved.x)))
 
@@ -68,46 +70,46 @@ def nan(values: Array) -> Array:
     return spoilt
 
 
-def rows_lost(drive: Trace, moved: Trace) -> Record:
+def rows_lost(drive: Trace, moved: Trace) -> Signals:
     """Rows of the table are missing: drive and displacement alike."""
     first = int(PLACE * len(drive.x))
     gone = np.arange(first, first + COUNT)
     return tuple(evolve(t, x=np.delete(t.x, gone), y=np.delete(t.y, gone)) for t in (drive, moved))
 
 
-def late(seconds: float) -> Callable[[Trace, Trace], Record]:
-    def shift(drive: Trace, moved: Trace) -> Record:
+def late(seconds: float) -> Callable[[Trace, Trace], Signals]:
+    def shift(drive: Trace, moved: Trace) -> Signals:
         return drive, evolve(moved, x=np.roll(moved.x, round(seconds / drive.sample_period)))
 
     return shift
 
 
-def swapped(drive: Trace, moved: Trace) -> Record:
+def swapped(drive: Trace, moved: Trace) -> Signals:
     return drive, evolve(moved, x=moved.y, y=moved.x)
 
 
-def of_y(drive: Trace, moved: Trace) -> Record:
+def of_y(drive: Trace, moved: Trace) -> Signals:
     """Both measured channels show y."""
     return drive, evolve(moved, x=moved.y)
 
 
-def saturated(drive: Trace, _moved: Trace) -> Record:
+def saturated(drive: Trace, _moved: Trace) -> Signals:
     """Recorded is the drive asked for, not what an amplifier at its limit makes of it."""
     limited = evolve(drive, x=np.minimum(drive.x, 0.7 * drive.x.max()))
     return drive, Piezoscanner(default_plant(), drive.sample_period, 1).advance(limited)[0]
 
 
-def first_rows(drive: Trace, moved: Trace) -> Record:
+def first_rows(drive: Trace, moved: Trace) -> Signals:
     return tuple(evolve(t, x=t.x[:3], y=t.y[:3]) for t in (drive, moved))
 
 
-def in_millivolts(drive: Trace, moved: Trace) -> Record:
+def in_millivolts(drive: Trace, moved: Trace) -> Signals:
     return evolve(drive, x=1e3 * drive.x), moved
 
 
 ONLY_HYSTERESIS = ("creep", "frequency", "validation")
 """In the others it shows only beside other records: test_cross_checks.py."""
-Damage = tuple[Callable[[Trace, Trace], Record], str, tuple[str, ...]]
+Damage = tuple[Callable[[Trace, Trace], Signals], str, tuple[str, ...]]
 DAMAGE: dict[str, Damage] = {
     "clipped": (measured(lambda x: np.minimum(x, 0.7 * x.max())), "clipped at its upper end", ()),
     "saturated": (saturated, "x saturates: at the top", ONLY_HYSTERESIS),
@@ -116,7 +118,7 @@ DAMAGE: dict[str, Damage] = {
     "repeated": (measured(repeated), "repeats what was before", ("creep",)),
     "rows lost": (rows_lost, "jumps, as if samples were lost", ("creep", "validation")),
     "spike": (measured(spike), "(has a spike|held or disturbed)", ()),
-    "NaN": (measured(nan), "displacement x is nan at sample 7", ()),
+    "NaN": (measured(nan), "displacement is nan at sample 7, channel 0", ()),
     "constant": (measured(np.zeros_like), "displacement x never changes", ()),
     "late": (late(LATE), "displacement x lags its drive", ()),
     "early": (late(-LATE), "displacement x leads its drive", ()),
@@ -137,10 +139,13 @@ CASES = [
 
 
 @pytest.mark.parametrize(("kind", "name"), CASES)
-def test_damage_is_named(good: dict[str, Record], kind: str, name: str) -> None:
+def test_damage_is_named(good: dict[str, Signals], kind: str, name: str) -> None:
     spoil, word, _ = DAMAGE[name]
     drive, displacement = spoil(*good[kind])
-    worst = next(problems(drive, displacement), "")
+    try:
+        worst = next(problems(Record.of_traces("record", drive, displacement)), "")
+    except InputError as error:
+        worst = str(error)
     assert re.search(word, worst), worst
 
 
@@ -158,4 +163,4 @@ SENSORS = {
 def test_a_good_record_gets_no_message(kind: str, sensor: str) -> None:
     plant = default_plant()
     plant = evolve(plant, sensor=evolve(plant.sensor, **SENSORS[sensor]))
-    assert list(problems(*record(kind, plant))) == []
+    assert list(problems(Record.of_traces(kind, *record(kind, plant)))) == []
