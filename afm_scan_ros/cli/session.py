@@ -22,7 +22,7 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
-from afm_scan_ros.report.html import Source, source_of
+from afm_scan_ros.report.provenance import Source, source_of
 
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement")
 TRUE = "true_displacement"

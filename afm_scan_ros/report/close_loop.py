@@ -16,7 +16,8 @@ from afm_scan_ros.report.diagnosis_text import (
     residuals,
     verdict_text,
 )
-from afm_scan_ros.report.html import Provenance, provenance_section
+from afm_scan_ros.report.html import provenance_section
+from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import TwoScans, error_figure, image_figure, images_of
 from afm_scan_ros.report.table import Part, Rows

@@ -43,7 +43,8 @@ from afm_scan_ros.report.diagnosis_text import (
     suggestion_text,
     why_not_text,
 )
-from afm_scan_ros.report.html import Provenance, heading_lines, provenance_section
+from afm_scan_ros.report.html import provenance_section
+from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
 from afm_scan_ros.report.residual import (
     chosen_text,

@@ -16,7 +16,8 @@ from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.html import Provenance, provenance_section
+from afm_scan_ros.report.html import provenance_section
+from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import TwoScans, error_figure
 from afm_scan_ros.report.style import BLUE, NANO, ORANGE, blank, styled
