@@ -51,27 +51,14 @@ def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
         yield axis, NAMES[name], f"{value:.4f}", f"{unchanged:g}", OUTCOMES[finding.outcome], limit
 
 
-DEFINITION = (
-    "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
-    " is fitted. Its rms is about zero. Percentages are of the axis' desired peak-to-peak. The"
-    " first line, the approach and the preparation are not part of 'all'."
-)
-CAPTION = (
-    "Three lines after the first: displacement and error over time, and the x error by position."
-)
-
-
 def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
     """Return the report as a self-contained HTML page."""
-    notes = [html.warning(text) for text in (*analysis.shortcomings, *analysis.warnings)]
     return html.page(
-        f"Scan {analysis.scan.scan_id}",
-        *notes,
-        html.table((), scan_rows(analysis)),
-        html.heading("Desired and achieved"),
-        html.picture(tracking_figure(view), CAPTION),
-        *html.texts(error_tables(analysis)),
-        html.paragraph(DEFINITION),
+        "scan.html",
+        analysis=analysis,
+        scanned=Rows((), scan_rows(analysis)),
+        lines=html.png(tracking_figure(view)),
+        errors=error_tables(analysis),
     )
 
 
@@ -153,21 +140,6 @@ def _row(name: str, figure: Error) -> TextRow:
     )
 
 
-ABOUT = (
-    "A simulated scanner moves over 40 µm by 40 µm. The model that is inverted was identified from"
-    " simulated records, so it is not exact. Each scan ran as separate processes and is recorded"
-    " in a bag. The error is achieved minus desired displacement, in percent of the range. Nothing"
-    " is fitted. Only 'measured' errors contain sensor noise. Without compensation each axis has"
-    " one constant gain. Errors in x are those of the constant-speed part. Errors in y are those on"
-    " trace, except those over its step."
-)
-IMAGE = (
-    "A simulated grating of 16 µm pitch and 100 nm height, scanned at {rate:g} Hz with {lines}"
-    " lines. Each height is drawn at the desired position. The height error is {without} nm rms"
-    " without compensation and {with_} nm rms with compensation."
-)
-
-
 @frozen
 class DemoScan:
     """One scan of the demonstration."""
@@ -240,27 +212,16 @@ def report(
 
     ``commands`` are what to do next: a purpose and the command line that serves it.
     """
-    pictures = [
-        html.picture(figure, f"{rate:g} Hz: three lines, without and with compensation")
-        for rate, figure in figures.items()
-    ]
+    scan, images = imaged
     return html.page(
-        "A piezoscanner without and with compensation",
-        html.paragraph(ABOUT),
-        *html.texts(table.text() for table in tables),
-        html.heading("Image of a grating"),
-        _grating(*imaged),
-        html.heading("Displacement and error of x and y"),
-        *pictures,
-        html.heading("What to do next"),
-        *(html.command(purpose, line) for purpose, line in commands),
+        "demo.html",
+        tables=[table.text() for table in tables],
+        imaged=scan,
+        grating=html.png(image_figure(images)),
+        errors=images.errors,
+        figures={rate: html.png(figure) for rate, figure in figures.items()},
+        commands=commands,
     )
-
-
-def _grating(of: DemoScan, images: Images) -> str:
-    without, compensated = map(nanometres, images.errors)
-    caption = IMAGE.format(rate=of.line_rate, lines=of.lines, without=without, with_=compensated)
-    return html.picture(image_figure(images), caption)
 
 
 def _demo_row(case: DemoScan, analysis: Analysis) -> dict[str, float | str]:
