@@ -6,8 +6,8 @@ from typing import TypeAlias
 from attrs import frozen
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.metrics import AxisError, Tracking
 from afm_scan_ros.core.metrics import Figure as Error
+from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.online.adaptation import CREEP_NAME, AxisState, Outcome
 from afm_scan_ros.core.online.adapted_reference import AxisShift
@@ -77,9 +77,24 @@ def error_tables(analysis: Analysis) -> Iterator[Rows]:
 
 def error_rows(tracking: Tracking) -> list[TextRow]:
     """Return a row for each error; percentages are of the desired peak-to-peak of that axis."""
-    named = (*_x(tracking), *_y(tracking.y), *_apart(tracking))
-    rows = [_row(name, figure) for name, figure in named if figure is not None]
-    for axis, error in (("x", tracking.x), ("y", tracking.y)):
+    x, y = tracking.x, tracking.y
+    named = {
+        "x, trace minus retrace": tracking.mismatch,
+        "x, constant speed": x.constant_speed,
+        "x, turn-arounds": x.turnarounds,
+        "x, all": x.all,
+        "y, on trace": y.trace,
+        "y, over the step": y.step,
+        "y, all": y.all,
+        "x, first line": x.first_line,
+        "x, approach": x.approach,
+        "x, preparation": x.preparation,
+        "y, first line": y.first_line,
+        "y, approach": y.approach,
+        "y, preparation": y.preparation,
+    }
+    rows = [_row(name, figure) for name, figure in named.items() if figure is not None]
+    for axis, error in (("x", x), ("y", y)):
         if error.repeatability is not None:
             share = percent(error.repeatability / error.peak_to_peak)
             name = f"{axis}, line-to-line repeatability"
@@ -108,26 +123,6 @@ def scan_rows(analysis: Analysis) -> list[TextRow]:
             ("drive y", f"{drive.lowest_y:.2f} to {drive.highest_y:.2f} V"),
         ]
     return rows
-
-
-def _x(tracking: Tracking) -> Iterator[tuple[str, Error | None]]:
-    yield "x, trace minus retrace", tracking.mismatch
-    yield "x, constant speed", tracking.x.constant_speed
-    yield "x, turn-arounds", tracking.x.turnarounds
-    yield "x, all", tracking.x.all
-
-
-def _y(error: AxisError) -> Iterator[tuple[str, Error | None]]:
-    yield "y, on trace", error.trace
-    yield "y, over the step", error.step
-    yield "y, all", error.all
-
-
-def _apart(tracking: Tracking) -> Iterator[tuple[str, Error | None]]:
-    for axis, error in (("x", tracking.x), ("y", tracking.y)):
-        yield f"{axis}, first line", error.first_line
-        yield f"{axis}, approach", error.approach
-        yield f"{axis}, preparation", error.preparation
 
 
 def _row(name: str, figure: Error) -> TextRow:

@@ -15,7 +15,7 @@ from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, 
 from afm_scan_ros.features.survey.recording import EffectValue, NamedEffect, Recording
 from afm_scan_ros.report import html
 from afm_scan_ros.report.provenance import UNSTATED
-from afm_scan_ros.report.quantity import nanometres, quantity, significant
+from afm_scan_ros.report.quantity import quantity, significant
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, blank, styled
 from afm_scan_ros.report.table import Part, Rows
 
@@ -27,9 +27,7 @@ QUANTITIES = {
     "creep": "creep of {}",
     "residual_ratio": "residual of {} over its detection limit",
 }
-CHANGED = ("instrument", "what changed", "by a factor of", "between", "and", "diagnosis")
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
-LISTED = ("recording", "time", "verdict", "effects", "detection limit, nm", "residual, nm")
 
 
 @frozen
@@ -85,7 +83,7 @@ def page(found: Survey, now: datetime) -> str:
         {
             "name": name,
             "trends": _trends(some, found.changed.get(name, [])),
-            "listed": Rows(LISTED, map(_row, sorted(some, key=lambda e: (e.recorded, e.bag)))),
+            "recordings": sorted(some, key=lambda each: (each.recorded, each.bag)),
             "models": sorted({each.model for each in some}),
         }
         for name, some in by_instrument(found.recordings)
@@ -94,11 +92,15 @@ def page(found: Survey, now: datetime) -> str:
         "survey.html",
         Path(__file__).parent / "templates",
         summary=summary(found),
-        changes=Rows(CHANGED, [_change_row(each) for each in found.changes]),
+        changes=found.changes,
         false_alarm=found.false_alarm,
         instruments=instruments,
         written=now,
         versions=sorted({each.version for each in found.recordings}),
+        what=_what,
+        factor=_factor,
+        time=_time,
+        effect=_effect_text,
     )
 
 
@@ -113,25 +115,6 @@ def _instrument_row(name: str, some: Sequence[Recording], found: Survey) -> tupl
     counts = ", ".join(f"{verdict}: {n}" for verdict, n in verdicts.most_common())
     result = "changed" if name in found.changed else "no change"
     return name, str(len(some)), str(sum(bool(each.error) for each in some)), counts, result
-
-
-def _change_row(change: Change) -> tuple[str, ...]:
-    times = _time(change.after), _time(change.before)
-    effects = ", ".join(change.effects) or "names no effect"
-    return change.instrument, _what(change), _factor(change), *times, effects
-
-
-def _row(recording: Recording) -> tuple[str, ...]:
-    name = recording.bag.rpartition("/")[2]
-    if recording.error:
-        return name, _time(recording.recorded), "not diagnosed", recording.error, "", ""
-    effects = "; ".join(map(_effect_text, recording.effects)) or "none"
-    limits, residuals = (
-        ", ".join(f"{each.axis} {nanometres(getattr(each, key))}" for each in recording.axes)
-        for key in ("detection_limit", "residual")
-    )
-    verdict = recording.verdict.replace("_", " ")
-    return name, _time(recording.recorded), verdict, effects, limits, residuals
 
 
 def _effect_text(effect: NamedEffect) -> str:
