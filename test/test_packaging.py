@@ -26,6 +26,7 @@ EXECUTABLES = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines(
 ROSDEP = {
     "attrs": "python3-attrs",
     "click": "python3-click",
+    "jinja2": "python3-jinja2",
     "matplotlib": "python3-matplotlib",
     "mcap": "mcap-ros2-support",
     "numba": "python3-numba",
@@ -69,7 +70,7 @@ def test_a_switch_of_the_launch_file_takes_no_other_word() -> None:
 
 
 def test_ros_is_told_of_every_dependency() -> None:
-    names = {re.match(r"[a-z]+", requirement)[0] for requirement in PROJECT["dependencies"]}
+    names = {re.match(r"[a-z0-9]+", requirement)[0] for requirement in PROJECT["dependencies"]}
     assert names == set(ROSDEP)
     for_ros = {each.text for each in PACKAGE.iter("exec_depend")}
     assert set(ROSDEP.values()) <= for_ros

@@ -45,7 +45,7 @@ from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report import plan_text
-from afm_scan_ros.report.html import Source, source_of
+from afm_scan_ros.report.provenance import Source, source_of
 from afm_scan_ros.report.table import Row
 
 

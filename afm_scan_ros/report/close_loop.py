@@ -16,7 +16,7 @@ from afm_scan_ros.report.diagnosis_text import (
     residuals,
     verdict_text,
 )
-from afm_scan_ros.report.html import Provenance, provenance_section
+from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_figures import TwoScans, error_figure, image_figure, images_of
 from afm_scan_ros.report.table import Part, Rows
@@ -37,16 +37,6 @@ NAMES = ("with the model's inverse", "with the extended model's inverse")
 REPLAYED = (
     "The simulated drift restarts with each scan, and so does its inverse, so all of it is"
     " compensated. A real drift does not restart. Its inverse helps only as far as it repeats."
-)
-HOW = (
-    "The nodes ran as separate processes. Each scan uses all inverses of its model. The error is"
-    " achieved minus desired displacement, rms about zero, without the first line. Nothing is"
-    " fitted to it. 'Measured' contains sensor noise, 'true' does not. For y, constant speed is the"
-    " part on trace."
-)
-RESIDUALS = (
-    "The residual is measured minus predicted displacement, without its mean. It is that of the"
-    " whole scans made with the extended model's inverse, which no fit saw."
 )
 
 
@@ -157,47 +147,36 @@ def final_text(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
 
 def close_loop_page(rounds: Sequence[Round], of: Provenance, failure: str = "") -> str:
     """Return the report as a self-contained HTML page; ``failure`` ended the next round, if any."""
-    parts = [part for number, done in enumerate(rounds, 1) for part in _round(number, done)]
-    parts += (html.heading("Method"), html.paragraph(HOW), *provenance_section(of))
+    found = reported(rounds).diagnosis
     return html.page(
-        "Closed loop: scan, diagnose, extend, scan again", *answer(rounds, failure), *parts
+        "close_loop.html",
+        result=(*verdict_text(found), *effects(found), *final_text(rounds, failure)),
+        next_steps=next_steps(found),
+        rounds=[
+            {
+                "verdict": done.diagnosis.verdict,
+                "result": round_result(done),
+                "scans": _scans(done) if done.comparisons else None,
+            }
+            for done in rounds
+        ],
+        names=NAMES,
+        provenance=of,
     )
 
 
-def answer(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
-    """Yield the first section: verdict, effects, errors before and after, what to do next."""
-    found = reported(rounds).diagnosis
-    yield html.heading("Result")
-    yield from html.texts(verdict_text(found))
-    yield from html.texts(effects(found))
-    yield from html.texts(final_text(rounds, failure))
-    yield html.heading("What to do next")
-    yield from html.texts(next_steps(found))
-
-
-def _round(number: int, done: Round) -> Iterator[str]:
-    yield html.heading(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}")
-    yield from html.texts(round_result(done))
-    yield f'<p><a href="round_{number}/report.html">Diagnosis of round {number}</a></p>'
-    if done.comparisons:
-        yield from _scans(done)
-
-
-def _scans(done: Round) -> Iterator[str]:
-    yield html.table(RESIDUAL, trial_residual_rows(done))
-    yield html.paragraph(RESIDUALS)
-    shown = "True" if done.before[FIRST].knows_true else "Measured"
-    caption = f"{shown} error of three lines of the same scan"
-    yield html.picture(error_figure(_both(done, FIRST)), caption)
+def _scans(done: Round) -> dict[str, object]:
+    """Return what the page shows of the scans with either inverse."""
     imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
     images = images_of(_both(done, imaged))
-    before, after = map(nanometres, images.errors)
-    yield html.picture(
-        image_figure(images),
-        f"A simulated grating of 16 µm pitch and 100 nm height, imaged by '{imaged}'. Each height"
-        f" is drawn at the desired position. The height error is {before} nm rms {NAMES[0]} and"
-        f" {after} nm rms {NAMES[1]}.",
-    )
+    return {
+        "residuals": Rows(RESIDUAL, trial_residual_rows(done)),
+        "displacement": "True" if done.before[FIRST].knows_true else "Measured",
+        "lines": html.png(error_figure(_both(done, FIRST))),
+        "imaged": imaged,
+        "grating": html.png(image_figure(images)),
+        "errors": images.errors,
+    }
 
 
 def _both(done: Round, name: str) -> TwoScans:

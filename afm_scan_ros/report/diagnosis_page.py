@@ -30,7 +30,6 @@ from afm_scan_ros.report.diagnosis_text import (
     LIMITS,
     TRIED,
     VERDICTS,
-    Row,
     alternative_rows,
     evidence_text,
     form_text,
@@ -41,7 +40,7 @@ from afm_scan_ros.report.diagnosis_text import (
     share_text,
     why_not_text,
 )
-from afm_scan_ros.report.html import Provenance, heading_lines, provenance_section
+from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
 from afm_scan_ros.report.residual import (
     chosen_text,
@@ -51,48 +50,21 @@ from afm_scan_ros.report.residual import (
 )
 from afm_scan_ros.report.table import Part, Rows
 
-METHOD = (
-    "The residual is measured minus predicted displacement under the recorded drive, each without"
-    " its mean. The detection limit of a band is sensor noise plus model discrepancy, which scales"
-    " with the record's motion. The likelihood of a residual is Student's t distribution in each"
-    " band. The probability of a set of effects follows from its evidence over all data, by"
-    " Laplace's method. An effect is named where its probability is 95 % or more and no band lacks"
-    " anything. Residuals in nm are of held-out stretches: the values are then fitted to the other"
-    " stretches. Intervals are 95 % intervals."
-)
-SHARES = (
-    "The share of an effect is the part of the held-out mean square that returns when it alone is"
-    " left out. The other effects keep their fitted values. Shares of several effects need not sum"
-    " to 100 %."
-)
-CAPTION = (
-    "The residual over the whole record. Top: rms by frequency band, and over time. Middle: by"
-    " position and by speed, mean and standard deviation. Bottom left: the mean line, or by travel"
-    " since the last turning point where the record has no lines. Bottom right: autocorrelation,"
-    " drawn as its range in each interval of lag."
-)
-
-
-def pictures(found: ResidualReport) -> dict[str, bytes]:
-    """Draw each axis' residual in the record where it is loudest, as PNG files have it."""
-    by_axis = found.diagnosis.by_axis
-    return {axis: html.png(_figure(found, diagnosed)) for axis, diagnosed in by_axis.items()}
-
 
 def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
     """Return the report as a self-contained HTML page, with the pictures of the axes."""
-    title = "Diagnosis of a scanner's residual"
-    parts = (*answer(found.diagnosis), *_parts(found, drawn))
-    warnings = map(html.warning, of.shortcomings)
-    return html.page(title, *warnings, *parts, *provenance_section(of))
-
-
-def answer(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield the first section: verdict, effects, error before and after, what to do next."""
-    yield html.heading("Result")
-    yield from html.texts(result(found))
-    yield html.heading("What to do next")
-    yield from html.texts(next_steps(found))
+    diagnosis = found.diagnosis
+    states = [map(initial_state_text, found.before[axis]) for axis in found.before]
+    return html.page(
+        "diagnosis.html",
+        provenance=of,
+        result=result(diagnosis),
+        next_steps=next_steps(diagnosis),
+        effects=list(_effects(diagnosis)),
+        alternatives=Rows(TRIED, alternative_rows(diagnosis)),
+        residuals={axis: (_residual(found, axis), drawn[axis]) for axis in diagnosis.by_axis},
+        records=zip(diagnosis.observations, zip(*states, strict=True), strict=True),
+    )
 
 
 def _figure(found: ResidualReport, diagnosed: AxisDiagnosis) -> Figure:
@@ -103,57 +75,31 @@ def _figure(found: ResidualReport, diagnosed: AxisDiagnosis) -> Figure:
     return residual_figure(diagnosed.evidence[record].limit, *stages)
 
 
-def _parts(found: ResidualReport, drawn: Mapping[str, bytes]) -> Iterator[str]:
-    diagnosis = found.diagnosis
-    if diagnosis.effects:
-        yield html.heading("Evidence for the effects")
-        yield from _effects(found)
-    if tried := alternative_rows(diagnosis):
-        yield html.heading("Alternatives")
-        yield html.table(TRIED, tried)
-    for axis in diagnosis.by_axis:
-        yield from _residual(found, axis, drawn[axis])
-    yield html.heading("Records")
-    headings = ("record", "samples", "sample period", "x at the start", "y at the start")
-    yield html.table(headings, _records(found))
-    yield html.heading("Method")
-    yield html.paragraph(METHOD)
+def _effects(found: ScannerDiagnosis) -> Iterator[str]:
+    """Yield the equation of each effect and the evidence for it."""
+    for effect in found.effects:
+        yield form_text(effect)
+        yield " ".join((share_text(effect), *evidence_text(effect)))
+    if any(effect.periodic for effect in found.effects):
+        yield CONVENTION
 
 
-def _records(found: ResidualReport) -> list[Row]:
-    began = [map(initial_state_text, found.before[axis]) for axis in found.before]
-    return [
-        (record.name, f"{len(record.drive):,}", f"{1e6 * record.sample_period:g} µs", *states)
-        for record, *states in zip(found.diagnosis.observations, *began, strict=True)
-    ]
-
-
-def _effects(found: ResidualReport) -> Iterator[str]:
-    for effect in found.diagnosis.effects:
-        yield html.paragraph(form_text(effect))
-        yield html.paragraph(" ".join((share_text(effect), *evidence_text(effect))))
-    if any(effect.periodic for effect in found.diagnosis.effects):
-        yield html.paragraph(CONVENTION)
-    yield html.paragraph(SHARES)
-
-
-def _residual(found: ResidualReport, axis: str, drawn: bytes) -> Iterator[str]:
+def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
+    """Yield what is known of the residual of an axis in the record that shows most of it."""
     diagnosed = found.diagnosis.by_axis[axis]
     record = most_excited_record(diagnosed)
     limit = diagnosed.evidence[record].limit
-    yield html.heading(f"The residual in {axis}")
     before = found.before[axis][record]
-    text = " ".join(residual_text(before, limit))
-    yield html.paragraph(f"{chosen_text(diagnosed)}{before.record}: {text}")
+    yield f"{chosen_text(diagnosed)}{before.record}: {' '.join(residual_text(before, limit))}"
     if diagnosed.final is not diagnosed.chain:
         after = residual_text(found.after[axis][record], limit)
-        yield html.paragraph(f"With the extended model: {' '.join(after)}")
-    yield html.image(drawn, CAPTION)
+        yield f"With the extended model: {' '.join(after)}"
 
 
 def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Provenance) -> None:
     """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
-    drawn = pictures(found)
+    by_axis = found.diagnosis.by_axis
+    drawn = {axis: html.png(_figure(found, diagnosed)) for axis, diagnosed in by_axis.items()}
     save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
     head = f"{heading}\n{heading_lines(of)}"
     save_model(folder / "model.extended.yaml", found.diagnosis.model, head)
@@ -166,11 +112,6 @@ def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Prove
 COUPLED_ROWS = ("effect", "probability", "share of the residual's\nmean square, %")
 RESIDUALS = ("axis", "residual, model,\nrms in nm", "with the effects", "detection\nlimit")
 HELD_OUT = "Residuals are rms of the last record of each amplitude, which no fit saw."
-COUPLED_METHOD = (
-    "Each set of effects is fitted with the structure to all records but the last of each"
-    " amplitude. Its simulation of these is compared with them. The likelihood of what it leaves is"
-    " Student's t distribution in each band, of noise and the error that the model states."
-)
 
 
 def coupled_result(found: CoupledDiagnosis) -> Iterator[Part]:
@@ -214,16 +155,13 @@ def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Prove
     """Write diagnosis.json, the extended model and the report."""
     save_diagnosis(folder / "diagnosis.json", {**coupled_document(found), "provenance": plain(of)})
     save_coupled(folder / "model.extended.yaml", found.model, f"{heading}\n{heading_lines(of)}")
-    parts = (
-        html.heading("Result"),
-        *html.texts((*coupled_result(found), *coupled_next_steps(found))),
-        html.heading("Alternatives"),
-        html.table(TRIED, _alternatives(found)),
-        html.heading("Method"),
-        html.paragraph(COUPLED_METHOD),
+    page = html.page(
+        "coupled_diagnosis.html",
+        provenance=of,
+        result=coupled_result(found),
+        next_steps=coupled_next_steps(found),
+        alternatives=Rows(TRIED, _alternatives(found)),
     )
-    warnings = map(html.warning, of.shortcomings)
-    page = html.page("Diagnosis of coupled axes", *warnings, *parts, *provenance_section(of))
     write_text(folder / "report.html", page)
 
 

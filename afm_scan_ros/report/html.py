@@ -1,87 +1,34 @@
-"""Self-contained HTML pages: text, tables, figures, and the provenance of what they report."""
+"""Self-contained HTML pages from templates, in which no text is markup."""
 
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Sequence
-from datetime import UTC, datetime
-from html import escape
 from io import BytesIO
 from pathlib import Path
 
-from attrs import field, frozen
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.coupled_scanner import CoupledScanner
-from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.scan_info import ScanInfo
-from afm_scan_ros.files import PACKAGE, version
-from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.style import styled
-from afm_scan_ros.report.table import Part
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 62rem;
-       margin: 2.5rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; font-weight: 600; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .9rem .25rem 0; text-align: right; vertical-align: top;
-         border-bottom: 1px solid #e5e7eb; white-space: nowrap; }
-.long { white-space: normal; }
-th { font-weight: 600; color: #6b7280; } td:first-child, th:first-child { text-align: left; }
-figure { margin: 1rem 0; } img { max-width: 100%; } figcaption { color: #6b7280; }
-pre { background: #f3f4f6; padding: .5rem .8rem; overflow-x: auto; }
-.warning { border-left: 4px solid #c4501b; padding-left: .8rem; }
-"""
+TEMPLATES = Path(__file__).parent / "templates"
 
 
-def page(title: str, *parts: str) -> str:
-    """Return a whole HTML document made of parts that are HTML already."""
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">'
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+def page(name: str, folder: Path = TEMPLATES, **values: object) -> str:
+    """Return a template of a folder as a page, with values; it may extend those of this package.
+
+    Each text among the values is escaped. A value that a template names and that is not given is
+    an error.
+    """
+    templates = Environment(
+        loader=FileSystemLoader([folder, TEMPLATES]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
-
-
-def heading(text: str) -> str:
-    """Return a section's heading."""
-    return f"<h2>{escape(text)}</h2>"
-
-
-def paragraph(text: str) -> str:
-    """Return a paragraph."""
-    return f"<p>{escape(text)}</p>"
-
-
-def warning(text: str) -> str:
-    """Return a paragraph that stands out."""
-    return f'<p class="warning">{escape(text)}</p>'
-
-
-def command(purpose: str, line: str) -> str:
-    """Return a command line with what it is for."""
-    return f"<p>{escape(purpose)}</p><pre>{escape(line)}</pre>"
-
-
-def texts(parts: Iterable[Part]) -> Iterator[str]:
-    """Yield sentences as paragraphs, and tables below their titles."""
-    for part in parts:
-        if isinstance(part, str):
-            yield paragraph(part)
-        else:
-            if part.title:
-                yield heading(part.title)
-            yield table(part.headings, part.rows)
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the first column names the rows. Without headings it has no head."""
-    head = _cells("th", headings) if headings else ""
-    return f"<table>{head}{''.join(_cells('td', row) for row in rows)}</table>"
-
-
-def picture(figure: Figure, caption: str) -> str:
-    """Return a figure, inside the page, with its caption."""
-    return image(png(figure), caption)
+    templates.filters |= {"base64": _base64, "nm": nanometres}
+    return templates.get_template(name).render(values)
 
 
 @styled
@@ -92,131 +39,5 @@ def png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def image(content: bytes, caption: str) -> str:
-    """Return a PNG file's content, inside the page, with its caption."""
-    data = b64encode(content).decode("ascii")
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
-
-UNBROKEN = 20
-"""Characters of a cell that stay on one line, as a time does."""
-
-
-def _cells(tag: str, texts: Sequence[str]) -> str:
-    kinds = ("" if len(text) <= UNBROKEN else ' class="long"' for text in texts)
-    cells = (f"<{tag}{k}>{escape(t)}</{tag}>" for k, t in zip(kinds, texts, strict=True))
-    return f"<tr>{''.join(cells)}</tr>"
-
-
-NANO = 1e-9
-DIGITS = 12
-"""Of a sample rate: its inverse is what a bag states, and the last digits are the division's."""
-UNSTATED = "not stated"
-
-
-@frozen
-class Source:
-    """A record as its bag describes itself; ``shortcomings`` name what is missing in it.
-
-    ``samples`` are those that were read, of as many as the bag announces.
-    ``recorded`` (UTC) is the time of its first sample, None where the bag does not know, as after
-    an import. ``model_hash`` is that of the model that was inverted, None where none was.
-    """
-
-    bag: str
-    scan_id: str
-    pattern: str
-    recorded: str | None
-    sample_rate: float = field(metadata={"unit": "hz"})
-    samples: int
-    samples_announced: int
-    model_hash: str | None
-    shortcomings: tuple[str, ...]
-
-
-@frozen
-class Provenance:
-    """Who made a report, when (UTC), with which model file, and of which records."""
-
-    package: str
-    written: str
-    model: str
-    model_hash: str
-    records: tuple[Source, ...]
-
-    @property
-    def shortcomings(self) -> tuple[str, ...]:
-        """What is missing in any of the records."""
-        return tuple(text for record in self.records for text in record.shortcomings)
-
-
-def source_of(name: str, info: ScanInfo, samples: int, shortcomings: Iterable[str] = ()) -> Source:
-    """Describe a record by what its bag states, and by how many samples were read of it."""
-    return Source(
-        bag=name,
-        scan_id=info.scan_id,
-        pattern=info.pattern,
-        recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
-        sample_rate=float(f"{1.0 / info.sample_period:.{DIGITS}g}"),
-        samples=samples,
-        samples_announced=info.total_samples,
-        model_hash=info.model_hash or None,
-        shortcomings=tuple(shortcomings),
-    )
-
-
-def provenance_of(
-    file: Path | str, model: ScannerModel | CoupledScanner, records: Iterable[Source], now: datetime
-) -> Provenance:
-    """State what is written ``now`` of records with the model of a file."""
-    package = f"{PACKAGE} {version()}"
-    return Provenance(package, _utc(now), str(file), model_hash(model), tuple(records))
-
-
-def heading_lines(found: Provenance) -> str:
-    """Return the same as lines of text, for the head of a model file."""
-    records = (
-        f"Record {of.bag}: scan {of.scan_id}, recorded: {of.recorded or UNSTATED}."
-        for of in found.records
-    )
-    made = f"Written {found.written} by {found.package} from {found.model}."
-    digest = f"SHA-256 of that model's numbers: {found.model_hash}"
-    return "\n".join((made, digest, *records, *found.shortcomings))
-
-
-def _utc(time: datetime) -> str:
-    return f"{time:%Y-%m-%dT%H:%M:%SZ}"
-
-
-RECORDS = ("record", "scan", "kind", "recorded", "rate, Hz", "samples", "inverted model")
-HASH_DIGITS = 12
-"""Of the digest of a model that a record was driven by: as many as its file's name has."""
-
-
-def provenance_section(found: Provenance) -> Iterator[str]:
-    """Yield the section on package, model and records."""
-    yield heading("Provenance")
-    rows = {
-        "written": f"{found.written} by {found.package}",
-        "model": found.model,
-        "SHA-256 of the model's numbers": found.model_hash,
-    }
-    yield table((), rows.items())
-    yield table(RECORDS, map(_row, found.records))
-
-
-def _row(record: Source) -> tuple[str, ...]:
-    cut = record.samples != record.samples_announced
-    of = f" of {record.samples_announced:,}" if cut else ""
-    return (
-        record.bag,
-        record.scan_id,
-        record.pattern,
-        record.recorded or UNSTATED,
-        f"{record.sample_rate:.10g}",
-        f"{record.samples:,}{of}",
-        (record.model_hash or "none")[:HASH_DIGITS],
-    )
+def _base64(content: bytes) -> str:
+    return b64encode(content).decode("ascii")

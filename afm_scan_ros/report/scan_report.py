@@ -6,8 +6,8 @@ from typing import TypeAlias
 from attrs import frozen
 from matplotlib.figure import Figure
 
-from afm_scan_ros.core.metrics import AxisError, Tracking
 from afm_scan_ros.core.metrics import Figure as Error
+from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report import html
 from afm_scan_ros.report.analysis import Analysis
@@ -15,27 +15,15 @@ from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import Images, ScanExcerpt, image_figure, tracking_figure
 from afm_scan_ros.report.table import Row, Rows, Table
 
-DEFINITION = (
-    "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
-    " is fitted. Its rms is about zero. Percentages are of the axis' desired peak-to-peak. The"
-    " first line, the approach and the preparation are not part of 'all'."
-)
-CAPTION = (
-    "Three lines after the first: displacement and error over time, and the x error by position."
-)
-
 
 def scan_report(analysis: Analysis, view: ScanExcerpt) -> str:
     """Return the report as a self-contained HTML page."""
-    notes = [html.warning(text) for text in (*analysis.shortcomings, *analysis.warnings)]
     return html.page(
-        f"Scan {analysis.scan.scan_id}",
-        *notes,
-        html.table((), scan_rows(analysis)),
-        html.heading("Desired and achieved"),
-        html.picture(tracking_figure(view), CAPTION),
-        *html.texts(error_tables(analysis)),
-        html.paragraph(DEFINITION),
+        "scan.html",
+        analysis=analysis,
+        scanned=Rows((), scan_rows(analysis)),
+        lines=html.png(tracking_figure(view)),
+        errors=error_tables(analysis),
     )
 
 
@@ -54,9 +42,24 @@ def error_tables(analysis: Analysis) -> Iterator[Rows]:
 
 def error_rows(tracking: Tracking) -> list[TextRow]:
     """Return a row for each error; percentages are of the desired peak-to-peak of that axis."""
-    named = (*_x(tracking), *_y(tracking.y), *_apart(tracking))
-    rows = [_row(name, figure) for name, figure in named if figure is not None]
-    for axis, error in (("x", tracking.x), ("y", tracking.y)):
+    x, y = tracking.x, tracking.y
+    named = {
+        "x, trace minus retrace": tracking.mismatch,
+        "x, constant speed": x.constant_speed,
+        "x, turn-arounds": x.turnarounds,
+        "x, all": x.all,
+        "y, on trace": y.trace,
+        "y, over the step": y.step,
+        "y, all": y.all,
+        "x, first line": x.first_line,
+        "x, approach": x.approach,
+        "x, preparation": x.preparation,
+        "y, first line": y.first_line,
+        "y, approach": y.approach,
+        "y, preparation": y.preparation,
+    }
+    rows = [_row(name, figure) for name, figure in named.items() if figure is not None]
+    for axis, error in (("x", x), ("y", y)):
         if error.repeatability is not None:
             share = percent(error.repeatability / error.peak_to_peak)
             name = f"{axis}, line-to-line repeatability"
@@ -87,26 +90,6 @@ def scan_rows(analysis: Analysis) -> list[TextRow]:
     return rows
 
 
-def _x(tracking: Tracking) -> Iterator[tuple[str, Error | None]]:
-    yield "x, trace minus retrace", tracking.mismatch
-    yield "x, constant speed", tracking.x.constant_speed
-    yield "x, turn-arounds", tracking.x.turnarounds
-    yield "x, all", tracking.x.all
-
-
-def _y(error: AxisError) -> Iterator[tuple[str, Error | None]]:
-    yield "y, on trace", error.trace
-    yield "y, over the step", error.step
-    yield "y, all", error.all
-
-
-def _apart(tracking: Tracking) -> Iterator[tuple[str, Error | None]]:
-    for axis, error in (("x", tracking.x), ("y", tracking.y)):
-        yield f"{axis}, first line", error.first_line
-        yield f"{axis}, approach", error.approach
-        yield f"{axis}, preparation", error.preparation
-
-
 def _row(name: str, figure: Error) -> TextRow:
     return (
         name,
@@ -115,21 +98,6 @@ def _row(name: str, figure: Error) -> TextRow:
         nanometres(figure.largest),
         percent(figure.largest_share),
     )
-
-
-ABOUT = (
-    "A simulated scanner moves over 40 µm by 40 µm. The model that is inverted was identified from"
-    " simulated records, so it is not exact. Each scan ran as separate processes and is recorded"
-    " in a bag. The error is achieved minus desired displacement, in percent of the range. Nothing"
-    " is fitted. Only 'measured' errors contain sensor noise. Without compensation each axis has"
-    " one constant gain. Errors in x are those of the constant-speed part. Errors in y are those on"
-    " trace, except those over its step."
-)
-IMAGE = (
-    "A simulated grating of 16 µm pitch and 100 nm height, scanned at {rate:g} Hz with {lines}"
-    " lines. Each height is drawn at the desired position. The height error is {without} nm rms"
-    " without compensation and {with_} nm rms with compensation."
-)
 
 
 @frozen
@@ -204,27 +172,16 @@ def report(
 
     ``commands`` are what to do next: a purpose and the command line that serves it.
     """
-    pictures = [
-        html.picture(figure, f"{rate:g} Hz: three lines, without and with compensation")
-        for rate, figure in figures.items()
-    ]
+    scan, images = imaged
     return html.page(
-        "A piezoscanner without and with compensation",
-        html.paragraph(ABOUT),
-        *html.texts(table.text() for table in tables),
-        html.heading("Image of a grating"),
-        _grating(*imaged),
-        html.heading("Displacement and error of x and y"),
-        *pictures,
-        html.heading("What to do next"),
-        *(html.command(purpose, line) for purpose, line in commands),
+        "demo.html",
+        tables=[table.text() for table in tables],
+        imaged=scan,
+        grating=html.png(image_figure(images)),
+        errors=images.errors,
+        figures={rate: html.png(figure) for rate, figure in figures.items()},
+        commands=commands,
     )
-
-
-def _grating(of: DemoScan, images: Images) -> str:
-    without, compensated = map(nanometres, images.errors)
-    caption = IMAGE.format(rate=of.line_rate, lines=of.lines, without=without, with_=compensated)
-    return html.picture(image_figure(images), caption)
 
 
 def _demo_row(case: DemoScan, analysis: Analysis) -> dict[str, float | str]:

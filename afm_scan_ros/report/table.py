@@ -1,17 +1,16 @@
 """A table of figures: printed on the terminal, drawn as a figure, and saved as JSON."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from attrs import frozen
 from matplotlib.figure import Figure
-from rich.box import SIMPLE_HEAD
+from rich.box import SIMPLE_HEAD, Box
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table as RichTable
-from rich.text import Text
 
 from afm_scan_ros.files.paths import replacing, write_text
 from afm_scan_ros.report.terminal import say, visible
@@ -24,16 +23,6 @@ WIDEST_WORD = 24
 """Letters of a word that a narrow terminal does not break."""
 
 
-def cell(text: str, style: str = "") -> Text:
-    """Return text for a table or its title, in which brackets are no markup."""
-    return Text(visible(text), style)
-
-
-def _heading(text: str) -> Text:
-    """Return the text above a column, which may have several lines."""
-    return Text("\n".join(map(visible, text.split("\n"))))
-
-
 @frozen
 class Rows:
     """Rows of text below their headings, if they have any; the first column names the rows."""
@@ -42,16 +31,28 @@ class Rows:
     rows: Iterable[Sequence[str]]
     title: str = ""
 
-    def show(self) -> None:
-        """Print the rows on the terminal."""
-        title = cell(self.title, "table.title") if self.title else None
-        shown = RichTable(box=None, pad_edge=False, title=title, title_justify="left")
-        for number, heading in enumerate(self.headings):
-            shown.add_column(_heading(heading), justify="right" if number else "left")
-        shown.show_header = bool(self.headings)
-        for row in self.rows:
-            shown.add_row(*map(cell, row))
-        Console().print(shown)
+    def show(self, box: Box | None = None, left: Container[int] = (0,)) -> None:
+        """Print the rows on the terminal; columns not of ``left`` are aligned on the right.
+
+        No text is markup, and no word of a cell is cut: a table may be wider than the terminal.
+        """
+        console = Console(markup=False, emoji=False, highlight=False)
+        rows = [[visible(text) for text in row] for row in self.rows]
+        heads = ["\n".join(map(visible, text.split("\n"))) for text in self.headings]
+        shown = RichTable(box=box, show_edge=False, pad_edge=False, show_header=bool(heads))
+        shown.padding = (0, 1 if box else 2, 0, 0)
+        columns = zip(heads or [""] * max(map(len, rows), default=0), *rows, strict=True)
+        for number, (head, *entries) in enumerate(columns):
+            words = " ".join([head, *entries]).split()
+            width = min(WIDEST_WORD, max(map(len, words), default=0))
+            side: Literal["left", "right"] = "left" if number in left or not heads else "right"
+            shown.add_column(head, justify=side, min_width=width, overflow="fold")
+        for row in rows:
+            shown.add_row(*row)
+        if self.title:
+            console.print(visible(self.title))
+        least = Measurement.get(console, console.options, shown).minimum
+        console.print(shown, width=max(console.width, least), crop=False)
 
 
 @frozen
@@ -69,28 +70,15 @@ class Table:
 
     def text(self) -> Rows:
         """Return the table as text."""
-        headings = [heading for heading, _ in self.columns.values()]
-        forms = {key: form for key, (_, form) in self.columns.items()}
-        rows = [[format(row[key], form) for key, form in forms.items()] for row in self.rows]
-        return Rows(headings, rows, self.title)
+        columns = self.columns.items()
+        rows = [[format(row[key], form) for key, (_, form) in columns] for row in self.rows]
+        return Rows([heading for _, (heading, _) in columns], rows, self.title)
 
     def show(self) -> None:
         """Print the table on the terminal."""
-        shown = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-        text = self.text()
-        columns = zip(text.headings, *text.rows, strict=True)
-        for (heading, *entries), (_, form) in zip(columns, self.columns.values(), strict=True):
-            words = " ".join([heading, *entries]).split()
-            width = min(WIDEST_WORD, max(len(word) for word in words))
-            side: Literal["left", "right"] = "right" if form else "left"
-            shown.add_column(_heading(heading), justify=side, min_width=width, overflow="fold")
-        for row in text.rows:
-            shown.add_row(*map(cell, row))
-        console = Console()
-        console.print(cell(self.title))
-        least = Measurement.get(console, console.options, shown).minimum
-        console.print(shown, width=max(console.width, least), crop=False)  # a number is never cut
-        console.print()
+        words = {number for number, (_, form) in enumerate(self.columns.values()) if not form}
+        self.text().show(SIMPLE_HEAD, words)
+        say("")
 
     def save(self, folder: Path) -> None:
         """Write ``NAME.json`` and, where the table has a picture, ``NAME.png``."""

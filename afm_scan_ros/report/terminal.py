@@ -1,9 +1,9 @@
 """Text on the terminal: whatever a file or a node puts into it, it is shown and does nothing."""
 
 import logging
-import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
+from unicodedata import category
 
 import click
 
@@ -17,17 +17,14 @@ def visible(text: str) -> str:
     These are control characters, line ends among them, marks that turn the direction of writing,
     and others that have no shape. A line that is very long is shortened in its middle.
     """
-    shown = text if text.isprintable() else "".join(map(_visible, text))
+    shown = "".join(
+        one if one.isprintable() or category(one) == "Zs" else one.encode("unicode_escape").decode()
+        for one in text
+    )
     if len(shown) <= LONGEST:
         return shown
     half = LONGEST // 2
     return f"{shown[:half]} … {len(shown) - 2 * half} characters … {shown[-half:]}"
-
-
-def _visible(character: str) -> str:
-    if character.isprintable() or unicodedata.category(character) == "Zs":
-        return character
-    return character.encode("unicode_escape").decode()
 
 
 def say(text: object, *, err: bool = False) -> None:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from attrs import evolve
+from markupsafe import escape
 
 from afm_scan_ros.core.identification.alternating import Sizes
 from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
@@ -14,7 +15,6 @@ from afm_scan_ros.core.identification.identify import (
     Identification,
     identify_records,
 )
-from afm_scan_ros.report import html
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from helpers.in_process import default_plant, record
@@ -85,7 +85,9 @@ def test_amplitude_and_delay_have_their_place(found: Identification, page: str) 
 def test_the_findings_on_a_short_record_are_shown(found: Identification, page: str) -> None:
     warnings = found.axes["y"].report.warnings
     assert any(isinstance(each, UndeterminedCreepElement) for each in warnings)
-    assert all(html.warning(f"y: {finding_text(each)}") in page for each in warnings)
+    assert all(
+        f'<p class="warning">y: {escape(finding_text(each))}</p>' in page for each in warnings
+    )
     assert fit_summary(found)["y"]["warnings"] == [finding_text(each) for each in warnings]
 
 

@@ -65,7 +65,7 @@ def test_a_hostile_scan_id_is_shown_on_its_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     whole = desired(SPEC, 0, total_samples(SPEC))
-    info = evolve(info_of_scan(SPEC, IN_UTF_8, 0), model_hash="[/]")
+    info = evolve(info_of_scan(SPEC, IN_UTF_8, 0), model_hash="[/]<b>")
     names = ("desired_displacement", "achieved_displacement")
     write_record(tmp_path / "bag", info, dict.fromkeys(names, whole))
     page = tmp_path / "a.html"
@@ -77,4 +77,4 @@ def test_a_hostile_scan_id_is_shown_on_its_line(
     out = capsys.readouterr().out
     assert not set(out) & set("\x1b\x9b\u202e\u2028\x00")
     assert r"[/b][red]a\x1b[2Jb\nwarning: c" in out.replace("\n", " ").replace("  ", " ")
-    assert page.exists()
+    assert ">[/]&lt;b&gt;<" in page.read_text("utf-8")

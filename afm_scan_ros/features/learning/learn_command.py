@@ -28,7 +28,7 @@ from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
-from afm_scan_ros.report.html import Provenance, heading_lines, provenance_of
+from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.html import Provenance, provenance_section
+from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_figures import TwoScans, error_figure
 from afm_scan_ros.report.style import BLUE, NANO, ORANGE, blank, styled
@@ -34,16 +35,8 @@ HEADINGS = (
     "next error over\nthis, at most",
     "share of error\nlearned",
 )
+TEMPLATES = Path(__file__).parent / "templates"
 DISPLACEMENTS = ("measured", "true")
-HOW = (
-    "The first two scans have one drive. Their difference is what does not repeat. Each later scan"
-    " has a corrected reference. All limits of the drive hold for it. The error is achieved minus"
-    " desired displacement, rms about zero, without the first line."
-)
-LEARNED = (
-    "A frequency is learned where the response is known well enough that its error cannot grow,"
-    " with a probability of 95 %. The bound on the next error follows from it."
-)
 
 
 @frozen(eq=False)
@@ -148,24 +141,18 @@ def learning_page(
 ) -> str:
     """Return the report as a self-contained HTML page; ``failure`` ended the scans, if any."""
     best = best_of(list(scans))
-    parts = [html.heading("Result")]
-    if failure:
-        parts.append(html.warning(f"Learning ended early: {failure}."))
-    parts += html.texts(learning_text(scans))
-    parts.append(html.picture(history_figure(scans), "Error by scan. Measured errors hold noise."))
-    if best.steps:
-        caption = (
-            "Left: the correction by frequency. Right: response of the scanner over its model, as"
-            " the scans show it, where a correction was learned."
-        )
-        parts.append(html.picture(spectrum_figure(best), caption))
-    parts.append(html.picture(error_figure(_two(scans[0], best)), "Error of three lines."))
-    if taught is not None:
-        parts.append(html.heading("What the model lacks"))
-        parts += html.texts(taught_text(taught))
-        parts += html.texts(f"next: {step}" for step in next_steps(taught.diagnosis))
-    parts += (html.heading("Method"), html.paragraph(HOW), html.paragraph(LEARNED))
-    return html.page("A scan learned from its errors", *parts, *provenance_section(of))
+    return html.page(
+        "learning.html",
+        TEMPLATES,
+        failure=failure,
+        learned=learning_text(scans),
+        history=html.png(history_figure(scans)),
+        spectrum=html.png(spectrum_figure(best)) if best.steps else None,
+        lines=html.png(error_figure(_two(scans[0], best))),
+        taught=taught and taught_text(taught),
+        next_steps=taught and next_steps(taught.diagnosis),
+        provenance=of,
+    )
 
 
 @styled

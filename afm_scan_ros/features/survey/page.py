@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 from attrs import frozen
@@ -13,12 +14,12 @@ from numpy.typing import NDArray
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
 from afm_scan_ros.features.survey.recording import EffectValue, NamedEffect, Recording
 from afm_scan_ros.report import html
-from afm_scan_ros.report.quantity import nanometres, quantity, significant
+from afm_scan_ros.report.provenance import UNSTATED
+from afm_scan_ros.report.quantity import quantity, significant
 from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, blank, styled
 from afm_scan_ros.report.table import Part, Rows
 
 NANO = 1e-9
-UNSTATED = "not stated"
 QUANTITIES = {
     "gain": "gain of {}",
     "resonance": "first resonance of {}",
@@ -26,27 +27,7 @@ QUANTITIES = {
     "creep": "creep of {}",
     "residual_ratio": "residual of {} over its detection limit",
 }
-CHANGED = ("instrument", "what changed", "by a factor of", "between", "and", "diagnosis")
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
-LISTED = ("recording", "time", "verdict", "effects", "detection limit, nm", "residual, nm")
-METHOD = (
-    "Each recording is diagnosed alone. In addition, the gain, the first resonance, its damping"
-    " ratio and the gains of creep are estimated together, each divided by the model's. The"
-    " estimates assume that no other effect is there. The residual is the rms over the bands of"
-    " residual divided by detection limit."
-)
-RULE = (
-    "A series has changed if its means before and after some time differ by more than its"
-    " scatter or the model's error. A survey of unchanged instruments reports a"
-    " change with a probability of {:.3g} at most. A diagnosis may name no effect where the series"
-    " shows a change: it sees one recording alone."
-)
-CAPTION = (
-    "Trends of {}. Points are the values of the recordings. Bars are 95 % intervals: dark by the"
-    " sensor's noise alone, light with the model's error, which recordings of the same scan share."
-    " The grey line is the model, or the detection limit. Orange is the time of a change (95 %"
-    " credible interval)."
-)
 
 
 @frozen
@@ -98,27 +79,35 @@ def summary(found: Survey) -> Iterator[Part]:
 
 def page(found: Survey, now: datetime) -> str:
     """Return the report as a self-contained HTML page."""
-    packages = sorted({each.version for each in found.recordings})
-    written = f"Written {now:%Y-%m-%dT%H:%M:%SZ} by afm_scan_ros {', '.join(packages)}."
-    changed = [_change_row(each) for each in found.changes]
-    parts = [html.heading("Instruments"), *html.texts(summary(found))]
-    parts += [html.heading("Changes"), html.table(CHANGED, changed)] if changed else []
-    parts += [html.paragraph(METHOD), html.paragraph(RULE.format(found.false_alarm))]
-    for name, some in by_instrument(found.recordings):
-        parts += [html.heading(name), *_instrument(name, some, found.changed.get(name, []))]
-    return html.page("Survey of recordings", *parts, html.paragraph(written))
+    instruments = [
+        {
+            "name": name,
+            "trends": _trends(some, found.changed.get(name, [])),
+            "recordings": sorted(some, key=lambda each: (each.recorded, each.bag)),
+            "models": sorted({each.model for each in some}),
+        }
+        for name, some in by_instrument(found.recordings)
+    ]
+    return html.page(
+        "survey.html",
+        Path(__file__).parent / "templates",
+        summary=summary(found),
+        changes=found.changes,
+        false_alarm=found.false_alarm,
+        instruments=instruments,
+        written=now,
+        versions=sorted({each.version for each in found.recordings}),
+        what=_what,
+        factor=_factor,
+        time=_time,
+        effect=_effect_text,
+    )
 
 
-def _instrument(
-    name: str, recordings: Sequence[Recording], changes: Sequence[Change]
-) -> Iterator[str]:
+def _trends(recordings: Sequence[Recording], changes: Sequence[Change]) -> bytes | None:
+    """Draw the trends of an instrument; None where it has none."""
     series = courses(recordings)
-    if series:
-        yield html.picture(_figure(series, changes), CAPTION.format(name))
-    ranked = sorted(recordings, key=lambda each: (each.recorded, each.bag))
-    yield html.table(LISTED, map(_row, ranked))
-    models = ", ".join(sorted({each.model for each in recordings}))
-    yield html.paragraph(f"SHA-256 of the model's files: {models}")
+    return html.png(_figure(series, changes)) if series else None
 
 
 def _instrument_row(name: str, some: Sequence[Recording], found: Survey) -> tuple[str, ...]:
@@ -126,25 +115,6 @@ def _instrument_row(name: str, some: Sequence[Recording], found: Survey) -> tupl
     counts = ", ".join(f"{verdict}: {n}" for verdict, n in verdicts.most_common())
     result = "changed" if name in found.changed else "no change"
     return name, str(len(some)), str(sum(bool(each.error) for each in some)), counts, result
-
-
-def _change_row(change: Change) -> tuple[str, ...]:
-    times = _time(change.after), _time(change.before)
-    effects = ", ".join(change.effects) or "names no effect"
-    return change.instrument, _what(change), _factor(change), *times, effects
-
-
-def _row(recording: Recording) -> tuple[str, ...]:
-    name = recording.bag.rpartition("/")[2]
-    if recording.error:
-        return name, _time(recording.recorded), "not diagnosed", recording.error, "", ""
-    effects = "; ".join(map(_effect_text, recording.effects)) or "none"
-    limits, residuals = (
-        ", ".join(f"{each.axis} {nanometres(getattr(each, key))}" for each in recording.axes)
-        for key in ("detection_limit", "residual")
-    )
-    verdict = recording.verdict.replace("_", " ")
-    return name, _time(recording.recorded), verdict, effects, limits, residuals
 
 
 def _effect_text(effect: NamedEffect) -> str:

@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from afm_scan_bench.paper.page import HEADINGS, document, page
 from afm_scan_bench.paper.section import Section
 from afm_scan_ros.report.scan_figures import save
+from afm_scan_ros.report.table import Rows
 
 IMAGES = ("figure_9", "figure_10", "figure_11")
 SECTIONS = ("table_1", "figure_5", "figure_6", "figure_8", *IMAGES, "figure_12")
@@ -47,7 +47,7 @@ def reproduce(names: tuple[str, ...], out: Path, lines: int) -> None:
     (out / "reproduce.json").write_text(json.dumps(document(done), indent=2) + "\n", "utf-8")
     (out / "report.html").write_text(page(done), "utf-8")
     for section in done:
-        _show(section)
+        Rows(HEADINGS, [row.row() for row in section.compared], section.title).show()
     click.echo(f"Report: {out / 'report.html'}. Figures and JSON are in the same folder.")
 
 
@@ -56,12 +56,3 @@ def _sections(names: tuple[str, ...], lines: int) -> Iterator[Section]:
     for name in track(names, "the paper's results", console=console, transient=True):
         module = importlib.import_module(f"afm_scan_bench.paper.{name}")
         yield module.section(lines) if name in IMAGES else module.section()
-
-
-def _show(section: Section) -> None:
-    shown = Table(title=section.title, title_justify="left")
-    for heading in HEADINGS:
-        shown.add_column(heading, justify="right" if heading else "left")
-    for row in section.compared:
-        shown.add_row(*row.row())
-    Console().print(shown)
