@@ -105,6 +105,15 @@ def _by_unit(source: _Source) -> str:
     return f"{quantity}_{letter[1] if letter else 'x'}"
 
 
+def _factor(column: Column, source: _Source) -> float:
+    """Return the SI value of 1 in a column; raises InputError where it has no unit."""
+    unit = column.unit or source.unit
+    what = f"{source.table.path}: {column.name} in column '{column.place}'"
+    if not unit:
+        raise InputError(f"{what}: has no unit: give it, as {column.name}={column.place}:UNIT")
+    return factor_of(unit, _units_of(column.name), what)
+
+
 @frozen(eq=False)
 class Columns:
     """All columns of tables joined column-wise, numbered on from one to the next."""
@@ -170,14 +179,24 @@ class Columns:
         known = ", ".join((*VOLTS, *METRES, *SECONDS))
         return f"{unknown} is none of the units {known}; " if unknown else ""
 
-    def values(self, column: Column) -> Array:
-        """Numbers of a column in SI units, shape (rows,); raises InputError where there is none."""
-        source = self._source(column)
-        unit = column.unit or source.unit
-        what = f"{source.table.path}: {column.name} in column '{column.place}'"
-        if not unit:
-            raise InputError(f"{what}: has no unit: give it, as {column.name}={column.place}:UNIT")
-        return factor_of(unit, _units_of(column.name), what) * source.table.column(source.index)
+    def values(self, columns: Sequence[Column]) -> dict[str, Array]:
+        """Columns by name, in SI units, all of one length; raises InputError where one is not."""
+        sources = {column.name: self._source(column) for column in columns}
+        factors = {column.name: _factor(column, sources[column.name]) for column in columns}
+        values: dict[str, Array] = {}
+        for table in self.tables:
+            names = [name for name, source in sources.items() if source.table is table]
+            numbers = table.columns([sources[name].index for name in names]) if names else ()
+            values |= {
+                name: factors[name] * each for name, each in zip(names, numbers, strict=True)
+            }
+        if len(set(map(len, values.values()))) > 1:
+            counts = ", ".join(f"{name} {len(values[name])}" for name in sources)
+            raise InputError(
+                f"{self.path}: the columns differ in their number of rows: {counts}: give columns"
+                " of one recording"
+            )
+        return {name: values[name] for name in sources}
 
     def _source(self, column: Column) -> _Source:
         found = [s for s in self._sources if column.place in {s.heading, s.name}]
@@ -246,7 +265,7 @@ def read_table_record(
             " taken"
         )
     _refuse_unpaired(tables.path, names, use)
-    values = _values(tables, chosen)
+    values = tables.values(chosen)
     signals: dict[str, dict[str, Array]] = {}
     for name, numbers in values.items():
         if form := FORM.fullmatch(name):
@@ -273,19 +292,6 @@ def _refuse_unpaired(path: Path, names: Sequence[str], use: str) -> None:
                     f"columns: no {quantity}_{axis}: name its column, or leave out all of axis"
                     f" {axis}"
                 )
-
-
-def _values(tables: Columns, columns: Sequence[Column]) -> dict[str, Array]:
-    """Columns by name, in SI units, all of one length."""
-    values = {column.name: tables.values(column) for column in columns}
-    lengths = {name: len(numbers) for name, numbers in values.items()}
-    if len(set(lengths.values())) > 1:
-        counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise InputError(
-            f"{tables.path}: the columns differ in their number of rows: {counts}: give columns of"
-            " one recording"
-        )
-    return values
 
 
 BLOCK = 100_000
