@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
@@ -106,10 +106,14 @@ class TextTable:
 
     def columns(self, indices: Sequence[int]) -> Array:
         """Numbers of columns, shape (columns, rows); raises InputError naming line and column."""
-        separator = self.dialect.separator
+        separator, rows = self.dialect.separator, self.rows
+        if separator and any('"' in row for row in rows):
+            rows = [
+                re.sub(' +"', '"', row) for row in rows
+            ]  # numpy takes quotes at the start alone
         try:
             numbers = np.loadtxt(
-                self.rows if separator == "," else map(self.dialect.with_points, self.rows),
+                rows if separator == "," else map(self.dialect.with_points, rows),
                 delimiter=separator,
                 usecols=indices,
                 unpack=True,
@@ -184,10 +188,10 @@ def read_text(path: Path, taken: RowRange) -> TextTable:
     within = taken.of(path, len(rows))
     numbers, rows = numbers[within], rows[within]
     if dialect.separator and all(row.endswith(dialect.separator) for row in rows):
-        rows, width = [row[:-1] for row in rows], width - 1
-    table = TextTable(path, dialect, numbers, rows, _names(heading, dialect, width))
+        rows = [row[:-1] for row in rows]
+    table = TextTable(path, dialect, numbers, rows)
     _refuse_ragged(table, open_end=open_end and numbers[-1] == len(lines))
-    return table
+    return evolve(table, names=_names(heading, dialect, table.width))
 
 
 def _text(path: Path) -> str:
