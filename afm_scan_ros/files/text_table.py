@@ -3,9 +3,9 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import compress, islice
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -18,7 +18,7 @@ from afm_scan_ros.files.units import is_unit
 MOST_COLUMNS = 10_000
 """Columns of a table, many times a converter's channels: what has more is no record."""
 LOOKED = 50
-"""Lines of the later half that determine the separator and the columns."""
+"""Lines of the later half that determine the separator and the columns, and first rows."""
 CHANCE = 0.01
 """Share of whole files without an end of line that may be taken for files cut short."""
 NUMBER = re.compile(
@@ -65,12 +65,6 @@ class Dialect:
         """Return what stands between the separators, without quotation marks."""
         return [cell.strip().strip('"').strip() for cell in line.split(self.separator)]
 
-    def counts(self, rows: Sequence[str]) -> list[int]:
-        """Return the number of cells of each row."""
-        if self.separator is None:
-            return [len(row.split()) for row in rows]
-        return [row.count(self.separator) + 1 for row in rows]
-
     def with_points(self, line: str) -> str:
         """Return a row or a cell with decimal points."""
         return line if self.separator == "," else line.replace(",", ".")
@@ -111,7 +105,8 @@ class TextTable:
             rows = [
                 re.sub(' +"', '"', row) for row in rows
             ]  # numpy takes quotes at the start alone
-        try:
+        numbers = np.empty((0, 0))
+        with suppress(ValueError):
             numbers = np.loadtxt(
                 rows if separator == "," else map(self.dialect.with_points, rows),
                 delimiter=separator,
@@ -121,46 +116,36 @@ class TextTable:
                 comments=None,
                 quotechar='"',
             )
-        except ValueError:
-            self._refuse(indices)
-        if numbers.shape[1] != len(self.rows) or not np.isfinite(numbers).all():
-            self._refuse(indices)
-        if separator != "," and all(any(mark in row for row in self.rows) for mark in ",."):
+        whole = numbers.shape[1] == len(rows) and np.isfinite(numbers).all()
+        if not whole or (separator != "," and all(any(m in row for row in rows) for m in ",.")):
             for index in indices:
-                self._refuse_both_marks(index)
-        return np.asarray(numbers, dtype=np.float64)
+                self._refuse_wrong(index)
+        if not whole:
+            raise InputError(
+                f"{self.path}: cannot be read as numbers: write them without quotation marks, and"
+                " in the digits 0 to 9"
+            )
+        return numbers
 
     def place(self, row: int, index: int) -> str:
         """Name a cell by file, line and column, with what it holds."""
         cell = self.dialect.cells(self.rows[row])[index]
         return f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}'"
 
-    def _refuse(self, indices: Sequence[int]) -> NoReturn:
-        """Raise InputError naming the first cell that is no finite number."""
-        for index in indices:
-            for row, cell in enumerate(self._cells(index)):
-                if not self.dialect.is_number(cell):
-                    raise InputError(f"{self.place(row, index)} is not a number: {FIX}")
-                if not np.isfinite(float(self.dialect.with_points(cell))):
-                    raise InputError(f"{self.place(row, index)} is not finite: {FIX}")
-        numbers = ", ".join(str(index + 1) for index in indices)
-        raise InputError(
-            f"{self.path}: column {numbers}: cannot be read as numbers: write them without"
-            " quotation marks, and in the digits 0 to 9"
-        )
-
-    def _refuse_both_marks(self, index: int) -> None:
-        """Raise InputError where some cells have a comma and some a point: one is for thousands."""
-        cells = self._cells(index)
-        comma = next((k for k, cell in enumerate(cells) if "," in cell), None)
-        if comma is not None and any("." in cell for cell in cells):
-            raise InputError(
-                f"{self.place(comma, index)} has a comma where other rows have a point: write"
-                " numbers with one decimal mark and without marks for thousands"
-            )
-
-    def _cells(self, index: int) -> list[str]:
-        return [self.dialect.cells(row)[index] for row in self.rows]
+    def _refuse_wrong(self, index: int) -> None:
+        """Raise InputError for a cell that is no finite number, or has a mark for thousands."""
+        cells = [self.dialect.cells(row)[index] for row in self.rows]
+        points = any("." in cell for cell in cells)
+        for row, cell in enumerate(cells):
+            if not self.dialect.is_number(cell):
+                raise InputError(f"{self.place(row, index)} is not a number: {FIX}")
+            if not np.isfinite(float(self.dialect.with_points(cell))):
+                raise InputError(f"{self.place(row, index)} is not finite: {FIX}")
+            if points and "," in cell:
+                raise InputError(
+                    f"{self.place(row, index)} has a comma where other rows have a point: write"
+                    " numbers with one decimal mark and without marks for thousands"
+                )
 
 
 def read_text(path: Path, taken: RowRange) -> TextTable:
@@ -184,13 +169,13 @@ def read_text(path: Path, taken: RowRange) -> TextTable:
         raise InputError(f"{path}: {width} columns, over {MOST_COLUMNS}: give a table of a record")
     first = _first_row(TextTable(path, dialect, numbers, rows), width, numeric)
     heading = lines[: numbers[first] - 1]
-    numbers, rows = numbers[first:], rows[first:]
-    within = taken.of(path, len(rows))
-    numbers, rows = numbers[within], rows[within]
+    within = taken.of(path, len(rows) - first)
+    numbers, rows = numbers[first:][within], rows[first:][within]
     if dialect.separator and all(row.endswith(dialect.separator) for row in rows):
         rows = [row[:-1] for row in rows]
     table = TextTable(path, dialect, numbers, rows)
     _refuse_ragged(table, open_end=open_end and numbers[-1] == len(lines))
+    _refuse_second_heading(table)
     return evolve(table, names=_names(heading, dialect, table.width))
 
 
@@ -256,7 +241,8 @@ def _first_row(table: TextTable, width: int, numeric: Sequence[int]) -> int:
 
 def _refuse_ragged(table: TextTable, *, open_end: bool) -> None:
     """Raise InputError unless rows have as many columns; one that no line end follows is whole."""
-    counts = table.dialect.counts(table.rows)
+    mark = table.dialect.separator
+    counts = [row.count(mark) + 1 if mark else len(row.split()) for row in table.rows]
     last = f"{table.path}: line {table.lines[-1]} is the last and has no line end"
     wrong = next((k for k, count in enumerate(counts) if count != counts[0]), None)
     if wrong == len(counts) - 1 and open_end and counts[-1] < counts[0]:
@@ -267,7 +253,7 @@ def _refuse_ragged(table: TextTable, *, open_end: bool) -> None:
             f"{table.path}: line {table.lines[wrong]} has {count} columns, line {table.lines[0]}"
             f" has {counts[0]}: correct the line, or leave a heading out with --skip-rows"
         )
-    if open_end and ends_within([table.dialect.cells(row)[-1] for row in table.rows]):
+    if open_end and _loses_digits([table.dialect.cells(row)[-1] for row in table.rows]):
         cell = table.dialect.cells(table.rows[-1])[-1]
         raise InputError(
             f"{last}: its '{cell}' has fewer digits than in every other row: {CUT}, or end it with"
@@ -275,7 +261,17 @@ def _refuse_ragged(table: TextTable, *, open_end: bool) -> None:
         )
 
 
-def ends_within(cells: Sequence[str]) -> bool:
+def _refuse_second_heading(table: TextTable) -> None:
+    """Raise InputError for a row without numbers: those above it are another table's."""
+    for number, row in zip(table.lines[:LOOKED], table.rows, strict=False):
+        if not any(map(table.dialect.is_number, table.dialect.cells(row))):
+            raise InputError(
+                f"{table.path}: line {number} holds no number: correct it, or give --skip-rows"
+                f" {number - 1} where it is the heading"
+            )
+
+
+def _loses_digits(cells: Sequence[str]) -> bool:
     """Whether the last of a column's cells has lost digits, of its mantissa or its exponent.
 
     It then ends a file whose writer was stopped. Many whole files have no end of line after their
@@ -285,16 +281,13 @@ def ends_within(cells: Sequence[str]) -> bool:
     """
     found = [match for match in map(NUMBER.fullmatch, cells) if match]
     mantissa = "fraction" if any(each["fraction"] for each in found) else "whole"
-    if _shortest(found, mantissa):
-        return True
     scaled = [each for each in found if each["exponent"]]
-    return _shortest(scaled if found and found[-1]["exponent"] else found, "exponent")
-
-
-def _shortest(found: Sequence[re.Match[str]], part: str) -> bool:
-    """Whether the last has less of a part than each of the others, which are enough to judge by."""
-    *others, last = [len(each[part] or "") for each in found] or [0]
-    return len(others) + 1 >= 1.0 / CHANCE and last < min(others)
+    alike = scaled if found and found[-1]["exponent"] else found
+    for part, of in ((mantissa, found), ("exponent", alike)):
+        *others, last = [len(each[part] or "") for each in of] or [0]
+        if len(others) + 1 >= 1.0 / CHANCE and last < min(others):
+            return True
+    return False
 
 
 def _names(heading: Sequence[str], dialect: Dialect, width: int) -> tuple[str, ...]:

@@ -124,6 +124,17 @@ def test_a_unit_may_follow_a_comma_where_a_tab_separates(tmp_path: Path) -> None
     np.testing.assert_allclose(found.displacement[:, 0], 16e-6 * np.arange(150.0))
 
 
+def test_a_table_of_settings_above_the_heading_is_left_out_as_the_refusal_says(
+    tmp_path: Path,
+) -> None:
+    rows = "".join(f"{k / 100}\t{k}\t{2 * k}\n" for k in range(150))
+    file, columns = tmp_path / "own.txt", "time=Time:s,drive_x=Ch1:V,achieved_x=Ch2:8um/V"
+    file.write_text(f"R,Ohm\tC,pF\tTemp,C\n0000\t0100\t+025.00\nTime,s\tCh1,V\tCh2,V\n{rows}")
+    with pytest.raises(afm.InputError, match=r"own\.txt: line 3 holds no number.*--skip-rows 2"):
+        afm.read_record(file, columns)
+    assert len(afm.read_record(file, columns, skip_rows=2).drive) == 150
+
+
 U, Y = np.random.default_rng(1).normal(size=(2, 300, 3))
 WRITERS: dict[str, Callable[[Path], object]] = {
     "npz": lambda file: np.savez(file, u=U, y=Y, rate=1e3),
