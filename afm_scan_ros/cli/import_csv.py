@@ -1,7 +1,5 @@
 """``afm-scan import-csv`` and ``invert``: tables of data to a bag, and of a path to a drive."""
 
-from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 import click
@@ -81,7 +79,8 @@ def import_csv(
     found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found)
     streams = _streams(found)
-    for problem in _problems(streams, axes):
+    drive, achieved = (streams.get(STREAM[quantity]) for quantity in ("drive", "achieved"))
+    if drive and achieved and (problem := next(problems(drive, achieved, axes), "")):
         if record in PLANS:
             raise InputError(f"{files[0]}: {problem}")
         warn([f"{files[0]}: {problem}"])
@@ -120,13 +119,6 @@ def _streams(record: TableRecord) -> dict[str, Trace]:
         )
         for quantity, signals in record.signals.items()
     }
-
-
-def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]:
-    """Yield the worst that keeps a drive and its displacement from being identified."""
-    if {"drive_voltage", "achieved_displacement"} <= streams.keys():
-        drive, achieved = (streams[s] for s in ("drive_voltage", "achieved_displacement"))
-        yield from islice(problems(drive, achieved, axes), 1)
 
 
 @click.command()

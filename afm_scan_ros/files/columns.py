@@ -14,7 +14,7 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
-from afm_scan_ros.files.text_table import RowRange
+from afm_scan_ros.files.text_table import EVERY, RowRange
 from afm_scan_ros.files.units import (
     METRES,
     SECONDS,
@@ -220,8 +220,8 @@ class TableRecord:
 def read_table_record(
     paths: Sequence[Path],
     columns: Sequence[Column] | None,
-    rows: RowRange,
-    sample_rate: float | None,
+    rows: RowRange = EVERY,
+    sample_rate: float | None = None,
     use: str = USE,
 ) -> TableRecord:
     """Read files joined column-wise, the columns numbered on from one to the next.
