@@ -101,10 +101,8 @@ class TextTable:
     def columns(self, indices: Sequence[int]) -> Array:
         """Numbers of columns, shape (columns, rows); raises InputError naming line and column."""
         separator, rows = self.dialect.separator, self.rows
-        if separator and any('"' in row for row in rows):
-            rows = [
-                re.sub(' +"', '"', row) for row in rows
-            ]  # numpy takes quotes at the start alone
+        if separator and any('"' in row for row in rows):  # numpy reads them next to separators
+            rows = [re.sub(' +"', '"', row) for row in rows]
         numbers = np.empty((0, 0))
         with suppress(ValueError):
             numbers = np.loadtxt(
