@@ -1,6 +1,5 @@
 """``afm-scan import-csv`` and ``invert``: tables of data to a bag, and of a path to a drive."""
 
-from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -82,10 +81,13 @@ def import_csv(
     found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found)
     streams = _streams(found)
-    for problem in _problems(streams, axes):
-        if record in PLANS:
-            raise InputError(f"{files[0]}: {problem}")
-        warn([f"{files[0]}: {problem}"])
+    drive, achieved = (streams.get(STREAM[quantity]) for quantity in ("drive", "achieved"))
+    if drive and achieved:
+        read = Record.of_traces(str(files[0]), drive, achieved, axes=axes)
+        for problem in islice(problems(read), 1):
+            if record in PLANS:
+                raise InputError(f"{files[0]}: {problem}")
+            warn([f"{files[0]}: {problem}"])
     warn(found.notes)
     info = ScanInfo(
         files[0].stem,
@@ -121,14 +123,6 @@ def _streams(record: TableRecord) -> dict[str, Trace]:
         )
         for quantity, signals in record.signals.items()
     }
-
-
-def _problems(streams: dict[str, Trace], axes: tuple[str, ...]) -> Iterator[str]:
-    """Yield the worst that keeps a drive and its displacement from being identified."""
-    if {"drive_voltage", "achieved_displacement"} <= streams.keys():
-        drive, achieved = (streams[s] for s in ("drive_voltage", "achieved_displacement"))
-        record = Record.of_traces("record", drive, achieved, axes=axes)
-        yield from islice(problems(record), 1)
 
 
 @click.command()

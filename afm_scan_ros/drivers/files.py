@@ -15,7 +15,6 @@ from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import SensorWatch, held_after
 from afm_scan_ros.files.columns import parse_columns, read_table_record
 from afm_scan_ros.files.records import from_mapping
-from afm_scan_ros.files.text_table import EVERY
 
 DRIVE_COLUMNS = ("time_s", "drive_x_v", "drive_y_v")
 RECORD_COLUMNS = parse_columns("time=time_s:s,drive_x=sensor_x_v:V,drive_y=sensor_y_v:V")
@@ -102,7 +101,7 @@ class FileExchange:
 
 def _readings(path: Path, drive: Trace) -> Trace:
     """Return a record's readings (V); raises InputError where they are not those of the drive."""
-    found = read_table_record([path], RECORD_COLUMNS, EVERY, None)
+    found = read_table_record([path], RECORD_COLUMNS)
     count, rate = drive.x.size, 1.0 / drive.sample_period
     if found.samples != count:
         raise InputError(

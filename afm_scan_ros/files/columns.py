@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +14,14 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.paths import replacing
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.files.tables import NumberTable, read_table
-from afm_scan_ros.files.text_table import RowRange
+from afm_scan_ros.files.text_table import EVERY, RowRange
 from afm_scan_ros.files.units import (
     METRES,
     SECONDS,
+    UNITS,
     VOLTS,
     bare_unit,
     factor_of,
-    in_brackets,
     name_and_unit,
 )
 
@@ -92,6 +93,51 @@ class _Source:
     unit: str
 
 
+def _sources(tables: Sequence[NumberTable]) -> list[_Source]:
+    """Return the columns of tables joined column-wise, numbered on from one to the next."""
+    return [
+        _Source(table, index, heading, *name_and_unit(heading))
+        for table in tables
+        for index, heading in enumerate(table.names or table.width * ("",))
+    ]
+
+
+def _named(sources: Sequence[_Source]) -> tuple[Column, ...]:
+    """Return the columns whose headings are quantities, as ``drive_x [V]``, and their time.
+
+    None where no heading is drive or displacement.
+    """
+    known = [s for s in sources if s.name == TIME or FORM.fullmatch(s.name)]
+    if all(s.name == TIME for s in known):
+        return ()
+    return tuple(Column(s.name, s.name, "") for s in known)
+
+
+def _by_units(sources: Sequence[_Source], use: str) -> tuple[Column, ...]:
+    """Return the columns by the units in their headings, as ``Voltage (V)``.
+
+    A voltage is the drive and a length the displacement, of the axis whose letter the heading
+    holds, or of ``x``. Raises InputError, which tells the ``use`` of names, unless there are drives
+    and displacements of the same axes, each once.
+    """
+    found = tuple(Column(_by_unit(s), s.heading, "") for s in sources if bare_unit(s.unit))
+    names = [column.name for column in found]
+    drives, moved = (
+        {name.partition("_")[2] for name in names if name.startswith(quantity)}
+        for quantity in ("drive", "achieved")
+    )
+    if drives and drives == moved and len(set(names)) == len(names):
+        return found
+    headings = ", ".join(s.heading for s in sources if s.heading)
+    there = f"its headings are {headings}" if headings else "it has no headings"
+    unknown = ", ".join(f"'{s.unit}'" for s in sources if s.unit and not bare_unit(s.unit))
+    units = f"{unknown} is none of the units {', '.join(UNITS)}; " if unknown else ""
+    raise InputError(
+        f"{sources[0].table.path}: {there}, none of which states what it holds, as 'time [s]' does:"
+        f" {units}{use}"
+    )
+
+
 def _by_unit(source: _Source) -> str:
     """Name a column by its unit, as ``drive_x``."""
     unit = bare_unit(source.unit)
@@ -105,94 +151,47 @@ def _by_unit(source: _Source) -> str:
     return f"{quantity}_{letter[1] if letter else 'x'}"
 
 
-@frozen(eq=False)
-class Columns:
-    """All columns of tables joined column-wise, numbered on from one to the next."""
-
-    tables: Sequence[NumberTable]
-    _sources: list[_Source] = field(init=False)
-
-    @_sources.default
-    def _sources_of_tables(self) -> list[_Source]:
-        found = []
-        for table in self.tables:
-            names = table.names if len(table.names) == table.width else ("",) * table.width
-            for index, heading in enumerate(names):
-                found.append(_Source(table, index, heading, *name_and_unit(heading)))
-        return found
-
-    @property
-    def path(self) -> Path:
-        """Return the first file, for messages."""
-        return self.tables[0].path
-
-    def named(self) -> tuple[Column, ...]:
-        """Return the columns whose headings are quantities, as ``drive_x [V]``, and their time.
-
-        None where no heading is drive or displacement. Raises InputError where the unit of such a
-        heading is unknown.
-        """
-        for source in self._sources:
-            name, unit = in_brackets(source.heading)
-            if unit and (name == TIME or FORM.fullmatch(name)):
-                factor_of(unit, _units_of(name), f"{source.table.path}: column '{source.heading}'")
-        known = [s for s in self._sources if s.name == TIME or FORM.fullmatch(s.name)]
-        if all(s.name == TIME for s in known):
-            return ()
-        return tuple(Column(s.name, s.heading, "") for s in known)
-
-    def by_units(self, use: str) -> tuple[Column, ...]:
-        """Return the columns by the units in their headings, as ``Voltage (V)``.
-
-        A voltage is the drive and a length the displacement, of the axis whose letter the heading
-        holds, or of ``x``. Raises InputError, which tells the ``use`` of names, unless there are
-        drives and displacements of the same axes, each once.
-        """
-        with_unit = [s for s in self._sources if s.unit]
-        found = tuple(Column(_by_unit(s), s.heading, "") for s in with_unit)
-        names = [column.name for column in found]
-        of = [
-            {n.partition("_")[2] for n in names if n.startswith(q)} for q in ("drive", "achieved")
-        ]
-        if not of[0] or of[0] != of[1] or len(set(names)) < len(names):
-            headings = ", ".join(s.heading for s in self._sources if s.heading)
-            there = f"its headings are {headings}" if headings else "it has no headings"
-            raise InputError(
-                f"{self.path}: {there}, none of which states what it holds, as 'time [s]' does:"
-                f" {self._unknown_units()}{use}"
-            )
-        return found
-
-    def _unknown_units(self) -> str:
-        """Name the units in brackets that are unknown, and those that are known."""
-        bracketed = (in_brackets(s.heading)[1] for s in self._sources if not s.unit)
-        unknown = ", ".join(f"'{unit}'" for unit in bracketed if unit)
-        known = ", ".join((*VOLTS, *METRES, *SECONDS))
-        return f"{unknown} is none of the units {known}; " if unknown else ""
-
-    def values(self, column: Column) -> Array:
-        """Numbers of a column in SI units, shape (rows,); raises InputError where there is none."""
-        source = self._source(column)
-        unit = column.unit or source.unit
-        what = f"{source.table.path}: {column.name} in column '{column.place}'"
-        if not unit:
-            raise InputError(f"{what}: has no unit: give it, as {column.name}={column.place}:UNIT")
-        return factor_of(unit, _units_of(column.name), what) * source.table.column(source.index)
-
-    def _source(self, column: Column) -> _Source:
-        found = [s for s in self._sources if column.place in {s.heading, s.name}]
-        if column.place.isdecimal() and 1 <= int(column.place) <= len(self._sources):
-            found = [self._sources[int(column.place) - 1]]
-        if len(found) == 1:
-            return found[0]
-        where = f"{self.path}: columns: {column.name} in column {column.place}"
-        if found:
-            raise InputError(f"{where}: {len(found)} columns have this name: give its number")
-        names = ", ".join(s.heading for s in self._sources if s.heading)
+def _values(sources: Sequence[_Source], columns: Sequence[Column]) -> dict[str, Array]:
+    """Columns by name, in SI units, all of one length; raises InputError where one is not."""
+    found = {column.name: _source(sources, column) for column in columns}
+    factors = {column.name: _factor(column, found[column.name]) for column in columns}
+    values: dict[str, Array] = {}
+    for table in dict.fromkeys(source.table for source in found.values()):
+        names = [name for name, source in found.items() if source.table is table]
+        numbers = table.columns([found[name].index for name in names])
+        values |= {name: factors[name] * n for name, n in zip(names, numbers, strict=True)}
+    if len(set(map(len, values.values()))) > 1:
+        counts = ", ".join(f"{name} {len(values[name])}" for name in found)
         raise InputError(
-            f"{where}: there are columns 1 to {len(self._sources)},"
-            + (f" named {names}" if names else " and no heading names them: give a number")
+            f"{sources[0].table.path}: the columns differ in their number of rows: {counts}: give"
+            " columns of one recording"
         )
+    return {name: values[name] for name in found}
+
+
+def _source(sources: Sequence[_Source], column: Column) -> _Source:
+    found = [s for s in sources if column.place in {s.heading, s.name}]
+    if column.place.isdecimal() and 1 <= int(column.place) <= len(sources):
+        found = [sources[int(column.place) - 1]]
+    if len(found) == 1:
+        return found[0]
+    where = f"{sources[0].table.path}: columns: {column.name} in column {column.place}"
+    if found:
+        raise InputError(f"{where}: {len(found)} columns have this name: give its number")
+    names = ", ".join(s.heading for s in sources if s.heading)
+    raise InputError(
+        f"{where}: there are columns 1 to {len(sources)},"
+        + (f" named {names}" if names else " and no heading names them: give a number")
+    )
+
+
+def _factor(column: Column, source: _Source) -> float:
+    """Return the SI value of 1 in a column; raises InputError where it has no unit."""
+    unit = column.unit or source.unit
+    what = f"{source.table.path}: column '{source.heading or column.place}'"
+    if not unit:
+        raise InputError(f"{what}: has no unit: give it, as {column.name}={column.place}:UNIT")
+    return factor_of(unit, _units_of(column.name), what)
 
 
 MOVED = ("achieved", "desired")
@@ -221,8 +220,8 @@ class TableRecord:
 def read_table_record(
     paths: Sequence[Path],
     columns: Sequence[Column] | None,
-    rows: RowRange,
-    sample_rate: float | None,
+    rows: RowRange = EVERY,
+    sample_rate: float | None = None,
     use: str = USE,
 ) -> TableRecord:
     """Read files joined column-wise, the columns numbered on from one to the next.
@@ -232,60 +231,46 @@ def read_table_record(
     column ``time``, which must be even. Raises InputError naming file, place and fix for whatever
     is wrong or missing; ``use`` shows how to name the columns.
     """
-    tables = Columns([read_table(path, rows) for path in paths])
-    chosen = columns or tables.named()
+    sources = _sources([read_table(path, rows) for path in paths])
+    chosen = columns or _named(sources)
     notes: tuple[str, ...] = ()
     if not chosen:
-        chosen = tables.by_units(use)
+        chosen = _by_units(sources, use)
         taken = ", ".join(f"{column.name} from '{column.place}'" for column in chosen)
-        notes = (f"{tables.path}: columns are taken by their units: {taken}",)
-    names = [column.name for column in chosen]
-    if (sample_rate is None) == (TIME not in names):
+        notes = (f"{paths[0]}: columns are taken by their units: {taken}",)
+    values = _values(sources, chosen)
+    if (sample_rate is None) == (TIME not in values):
         raise InputError(
-            f"{tables.path}: give either a sample rate or a column 'time', for when samples were"
-            " taken"
+            f"{paths[0]}: give either a sample rate or a column 'time', for when samples were taken"
         )
-    _refuse_unpaired(tables.path, names, use)
-    values = _values(tables, chosen)
-    signals: dict[str, dict[str, Array]] = {}
-    for name, numbers in values.items():
-        if form := FORM.fullmatch(name):
-            signals.setdefault(form["quantity"], {})[form["axis"]] = numbers
-    signals = {quantity: signals[quantity] for quantity in QUANTITIES if quantity in signals}
+    signals = _paired(paths[0], values, use)
     if sample_rate:
         return TableRecord(1.0 / sample_rate, signals, notes)
     moved = [each for name in MOVED for each in signals.get(name, {}).values()]
-    with naming(tables.path):
+    with naming(paths[0]):
         timing = timing_of(values[TIME], moved, first_row=rows.first)
-    notes += (f"{tables.path}: {timing.note}",) if timing.note else ()
+    notes += (f"{paths[0]}: {timing.note}",) if timing.note else ()
     return TableRecord(timing.sample_period, signals, notes)
 
 
-def _refuse_unpaired(path: Path, names: Sequence[str], use: str) -> None:
-    """Raise InputError unless each quantity has a column for each axis that any has."""
-    forms = [form for form in map(FORM.fullmatch, names) if form]
-    if not forms:
+def _paired(path: Path, values: Mapping[str, Array], use: str) -> dict[str, dict[str, Array]]:
+    """Return the values by quantity and axis.
+
+    Raises InputError unless each quantity has a column for each axis that any has.
+    """
+    found: dict[str, dict[str, Array]] = {quantity: {} for quantity in QUANTITIES}
+    for name, numbers in values.items():
+        if form := FORM.fullmatch(name):
+            found[form["quantity"]][form["axis"]] = numbers
+    signals = {quantity: by_axis for quantity, by_axis in found.items() if by_axis}
+    if not signals:
         raise InputError(f"{path}: no column is drive or displacement: {use}")
-    for quantity in dict.fromkeys(form["quantity"] for form in forms):
-        for axis in dict.fromkeys(form["axis"] for form in forms):
-            if f"{quantity}_{axis}" not in names:
-                raise InputError(
-                    f"columns: no {quantity}_{axis}: name its column, or leave out all of axis"
-                    f" {axis}"
-                )
-
-
-def _values(tables: Columns, columns: Sequence[Column]) -> dict[str, Array]:
-    """Columns by name, in SI units, all of one length."""
-    values = {column.name: tables.values(column) for column in columns}
-    lengths = {name: len(numbers) for name, numbers in values.items()}
-    if len(set(lengths.values())) > 1:
-        counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise InputError(
-            f"{tables.path}: the columns differ in their number of rows: {counts}: give columns of"
-            " one recording"
-        )
-    return values
+    for quantity, axis in product(signals, sorted({a for each in signals.values() for a in each})):
+        if axis not in signals[quantity]:
+            raise InputError(
+                f"columns: no {quantity}_{axis}: name its column, or leave out all of axis {axis}"
+            )
+    return signals
 
 
 BLOCK = 100_000

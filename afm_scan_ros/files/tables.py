@@ -1,6 +1,6 @@
 """Tables of numbers that no ROS recorded: text, and arrays of numpy and MATLAB."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -41,8 +41,11 @@ class ArrayTable:
         """Number of columns."""
         return len(self.cells)
 
-    def column(self, index: int) -> Array:
-        """Numbers of a column, shape (rows,); raises InputError naming a row that is not finite."""
+    def columns(self, indices: Sequence[int]) -> list[Array]:
+        """Numbers of columns, shape (rows,); raises InputError naming a row that is not finite."""
+        return [self._column(index) for index in indices]
+
+    def _column(self, index: int) -> Array:
         cells = self.cells[index]
         taken = cells[self.rows.of(self.path, len(cells))]
         numbers = np.asarray(taken, dtype=np.float64)

@@ -2,21 +2,33 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import compress, islice
 from pathlib import Path
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.units import is_unit
 
-LEAST = 2
-"""Rows of a table, at least."""
 MOST_COLUMNS = 10_000
 """Columns of a table, many times a converter's channels: what has more is no record."""
+LOOKED = 50
+"""Lines of the later half that determine the separator and the columns, and first rows."""
+CHANCE = 0.01
+"""Share of whole files without an end of line that may be taken for files cut short."""
+NUMBER = re.compile(
+    r'\W*+(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*'
+)
+COMMENTS = ("#", "%")
+SEPARATORS = (";", "\t", ",", None)
+"""In the order in which they are preferred; None stands for blanks."""
+FIX = "correct the cell, or leave its row out with 'afm-scan import-csv --start-row --stop-row'"
+CUT = "the file was cut short: remove the line"
 
 
 @frozen
@@ -30,8 +42,8 @@ class RowRange:
     def of(self, path: Path, count: int) -> slice:
         """Return which of ``count`` rows are taken; raises InputError where less than two are."""
         last = count if self.last is None else self.last
-        if count < LEAST:
-            raise InputError(f"{path}: {count} row of numbers: give {LEAST} at least")
+        if count == 1:
+            raise InputError(f"{path}: 1 row of numbers: give 2 at least")
         if not 1 <= self.first < last <= count:
             raise InputError(
                 f"{path}: rows {self.first} to {last} of {count}: choose --start-row and --stop-row"
@@ -43,103 +55,95 @@ class RowRange:
 EVERY = RowRange()
 
 
-CHANCE = 0.01
-"""Share of whole files without an end of line that may be taken for files cut short."""
-NUMBER = re.compile(
-    r'\W*+(?P<whole>\d*)(?P<fraction>[.,]\d*)?(?:[eE][-+]?(?P<exponent>\d*))?["\s]*'
-)
+@frozen
+class Dialect:
+    """How rows are written: with another separator than a comma, numbers may have a decimal one."""
 
+    separator: str | None
 
-def ends_within(cells: Sequence[str]) -> bool:
-    """Whether the last of a column's cells has lost digits, of its mantissa or its exponent.
+    def cells(self, line: str) -> list[str]:
+        """Return what stands between the separators, without quotation marks."""
+        return [cell.strip().strip('"').strip() for cell in line.split(self.separator)]
 
-    It then ends a file whose writer was stopped. Many whole files have no end of line after their
-    last row, and a number cut short is a number too. But a row is written as the others are. Its
-    last number has fewer digits than in each of n other rows by chance in one of n + 1 files at
-    most.
-    """
-    found = [match for match in map(NUMBER.fullmatch, cells) if match]
-    mantissa = "fraction" if any(each["fraction"] for each in found) else "whole"
-    if _shortest(found, mantissa):
+    def with_points(self, line: str) -> str:
+        """Return a row or a cell with decimal points."""
+        return line if self.separator == "," else line.replace(",", ".")
+
+    def is_number(self, cell: str) -> bool:
+        """Whether a cell is a number, which may not be finite."""
+        if "_" in cell or cell.endswith(","):
+            return False
+        try:
+            float(self.with_points(cell))
+        except ValueError:
+            return False
         return True
-    scaled = [each for each in found if each["exponent"]]
-    return _shortest(scaled if found and found[-1]["exponent"] else found, "exponent")
-
-
-def _shortest(found: Sequence[re.Match[str]], part: str) -> bool:
-    """Whether the last has less of a part than each of the others, which are enough to judge by."""
-    *others, last = [len(each[part] or "") for each in found] or [0]
-    return len(others) + 1 >= 1.0 / CHANCE and last < min(others)
-
-
-COMMENTS = ("#", "%")
-SEPARATORS = (";", "\t", ",", None)
-"""In the order in which they are preferred; None stands for blanks."""
-LOOKED = 50
-"""Lines of the later half that determine the separator and the columns."""
-FIX = "correct the cell, or leave its row out with 'afm-scan import-csv --start-row --stop-row'"
-CUT = "the file was cut short: remove the line"
 
 
 @frozen(eq=False)
 class TextTable:
     """Rows of a text file, and the line in which each of them stands.
 
-    ``names`` are those of the columns, empty where the file gives none. With another separator
-    than a comma, numbers may have a decimal comma.
+    ``names`` are those of the columns, empty where the file gives none.
     """
 
     path: Path
-    names: tuple[str, ...]
-    separator: str | None
+    dialect: Dialect
     lines: NDArray[np.intp] = field(repr=False)
     rows: Sequence[str] = field(repr=False)
-    both_marks: bool = False
+    names: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(_cells(self.rows[0], self.separator))
+        return len(self.dialect.cells(self.rows[0]))
 
-    def column(self, index: int) -> Array:
-        """Numbers of a column, shape (rows,); raises InputError naming line and column."""
-        decimal_points = self.separator == ","
-        rows = self.rows if decimal_points else (row.replace(",", ".") for row in self.rows)
-        try:
+    def columns(self, indices: Sequence[int]) -> Array:
+        """Numbers of columns, shape (columns, rows); raises InputError naming line and column."""
+        separator, rows = self.dialect.separator, self.rows
+        if separator and any('"' in row for row in rows):  # numpy reads them next to separators
+            rows = [re.sub(' +"', '"', row) for row in rows]
+        numbers = np.empty((0, 0))
+        with suppress(ValueError):
             numbers = np.loadtxt(
-                rows, delimiter=self.separator, usecols=index, comments=None, quotechar='"', ndmin=1
+                rows if separator == "," else map(self.dialect.with_points, rows),
+                delimiter=separator,
+                usecols=indices,
+                unpack=True,
+                ndmin=2,
+                comments=None,
+                quotechar='"',
             )
-        except ValueError:
-            raise InputError(self._fault(index)) from None
-        bad = np.flatnonzero(~np.isfinite(numbers))
-        if bad.size:
-            raise InputError(f"{self._place(int(bad[0]), index)} is not finite: {FIX}")
-        if self.both_marks:
-            self._refuse_both_marks(index)
-        return np.asarray(numbers, dtype=np.float64)
+        whole = numbers.shape[1] == len(rows) and np.isfinite(numbers).all()
+        if not whole or (separator != "," and all(any(m in row for row in rows) for m in ",.")):
+            for index in indices:
+                self._refuse_wrong(index)
+        if not whole:
+            raise InputError(
+                f"{self.path}: cannot be read as numbers: write them without quotation marks, and"
+                " in the digits 0 to 9"
+            )
+        return numbers
 
-    def _cell(self, row: int, index: int) -> str:
-        return _cells(self.rows[row], self.separator)[index]
-
-    def _place(self, row: int, index: int) -> str:
-        cell = self._cell(row, index)
+    def place(self, row: int, index: int) -> str:
+        """Name a cell by file, line and column, with what it holds."""
+        cell = self.dialect.cells(self.rows[row])[index]
         return f"{self.path}: line {self.lines[row]}, column {index + 1}: '{cell}'"
 
-    def _fault(self, index: int) -> str:
-        for row in range(len(self.rows)):
-            if not _is_number(self._cell(row, index), self.separator):
-                return f"{self._place(row, index)} is not a number: {FIX}"
-        return f"{self.path}: column {index + 1} cannot be read as numbers: {FIX}"
-
-    def _refuse_both_marks(self, index: int) -> None:
-        """Raise InputError where some cells have a comma and some a point: one is for thousands."""
-        cells = [_cells(row, self.separator)[index] for row in self.rows]
-        comma = next((k for k, cell in enumerate(cells) if "," in cell), None)
-        if comma is not None and any("." in cell for cell in cells):
-            raise InputError(
-                f"{self._place(comma, index)} has a comma where other rows have a point: write"
-                " numbers with one decimal mark and without marks for thousands"
-            )
+    def _refuse_wrong(self, index: int) -> None:
+        """Raise InputError for a cell that is no finite number, or has a mark for thousands."""
+        cells = [self.dialect.cells(row)[index] for row in self.rows]
+        points = any("." in cell for cell in cells)
+        for row, cell in enumerate(cells):
+            if not self.dialect.is_number(cell):
+                raise InputError(f"{self.place(row, index)} is not a number: {FIX}")
+            if not np.isfinite(float(self.dialect.with_points(cell))):
+                raise InputError(f"{self.place(row, index)} is not finite: {FIX}")
+            if points and "," in cell:
+                raise InputError(
+                    f"{self.place(row, index)} has a comma where other rows have a point: write"
+                    " numbers with one decimal mark and without marks for thousands"
+                )
 
 
 def read_text(path: Path, taken: RowRange) -> TextTable:
@@ -148,31 +152,29 @@ def read_text(path: Path, taken: RowRange) -> TextTable:
     A line of units may follow that of the names. Raises InputError for what is not text, for
     ragged rows, and for a last row that was cut short.
     """
-    text = _text(path).replace("\r\n", "\n")
-    lines = text.rstrip().split("\n")
-    kept = [k for k in range(taken.skipped, len(lines)) if not lines[k].startswith(COMMENTS)]
-    filled = next((n for n, k in enumerate(kept) if lines[k].strip()), len(kept))
-    places = np.array(kept[filled:], dtype=np.intp)
-    if not places.size:
+    lines = _text(path).replace("\r\n", "\n").split("\n")
+    open_end = bool(lines[-1].strip())
+    while lines and not lines[-1].strip():
+        lines.pop()
+    body = lines[taken.skipped :]
+    kept = [not line.startswith(COMMENTS) for line in body]
+    numbers, rows = taken.skipped + 1 + np.flatnonzero(kept), list(compress(body, kept))
+    if not any(map(str.strip, rows)):
         after = f" after {taken.skipped} skipped lines" if taken.skipped else ""
         raise InputError(f"{path}: no rows{after}: give columns of drive and displacement")
-    sample = _sample([lines[k] for k in places])
-    separator = _separator(sample)
-    width, numeric = _columns(sample, separator)
+    dialect, width, numeric = _sniffed(rows)
     if width > MOST_COLUMNS:
         raise InputError(f"{path}: {width} columns, over {MOST_COLUMNS}: give a table of a record")
-    numbered = ((int(k) + 1, lines[k]) for k in places)
-    places = places[_first_row(path, numbered, separator, width, numeric) :]
-    heading = lines[: places[0]]
-    places = places[taken.of(path, len(places))]
-    numbers, rows = places + 1, tuple(lines[k] for k in places)
-    if separator and all(row.endswith(separator) for row in rows):
-        rows, width = tuple(row[:-1] for row in rows), width - 1
-    open_end = numbers[-1] == len(lines) and not text[len(text.rstrip()) :].count("\n")
-    _refuse_ragged(path, numbers, rows, separator, open_end=open_end)
-    marks = "".join(rows) if separator != "," else ""
-    both = "," in marks and "." in marks
-    return TextTable(path, _names(heading, separator, width), separator, numbers, rows, both)
+    first = _first_row(TextTable(path, dialect, numbers, rows), width, numeric)
+    heading = lines[: numbers[first] - 1]
+    within = taken.of(path, len(rows) - first)
+    numbers, rows = numbers[first:][within], rows[first:][within]
+    if dialect.separator and all(row.endswith(dialect.separator) for row in rows):
+        rows = [row[:-1] for row in rows]
+    table = TextTable(path, dialect, numbers, rows)
+    _refuse_ragged(table, open_end=open_end and numbers[-1] == len(lines))
+    _refuse_second_heading(table)
+    return evolve(table, names=_names(heading, dialect, table.width))
 
 
 def _text(path: Path) -> str:
@@ -187,138 +189,125 @@ def _text(path: Path) -> str:
         return data.decode("latin-1")
 
 
-def _cells(line: str, separator: str | None) -> list[str]:
-    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+def _sniffed(rows: Sequence[str]) -> tuple[Dialect, int, list[int]]:
+    """Return the dialect, the number of columns, and those that hold numbers in most lines.
 
-
-def _plain(row: str, separator: str | None) -> str:
-    """Return a row with decimal points."""
-    return row if separator == "," else row.replace(",", ".")
-
-
-def _is_number(cell: str, separator: str | None) -> bool:
-    if "_" in cell or cell.endswith(","):
-        return False
-    try:
-        float(_plain(cell, separator))
-    except ValueError:
-        return False
-    return True
-
-
-def _sample(lines: Sequence[str]) -> list[str]:
-    """Lines of the later half, which a heading hardly reaches."""
-    filled = [line for line in lines if line.strip()]
+    They are those of lines of the later half, which a heading hardly reaches. The separator is the
+    one that makes most of the cells, and then most cells, numbers.
+    """
+    filled = [row for row in rows if row.strip()]
     later = filled[len(filled) // 2 :]
-    return later[:: max(1, len(later) // LOOKED)]
+    sample = later[:: max(1, len(later) // LOOKED)]
 
-
-def _separator(sample: Sequence[str]) -> str | None:
-    """Return the separator that makes most of the cells, and then most cells, numbers."""
-
-    def merit(separator: str | None) -> tuple[float, int]:
-        cells = [cell for line in sample for cell in _cells(line, separator)]
-        numbers = sum(_is_number(cell, separator) for cell in cells)
+    def merit(dialect: Dialect) -> tuple[float, int]:
+        cells = [cell for line in sample for cell in dialect.cells(line)]
+        numbers = sum(map(dialect.is_number, cells))
         return numbers / max(1, len(cells)), numbers
 
-    there = [mark for mark in SEPARATORS if mark is None or any(mark in line for line in sample)]
-    return max(there, key=merit)
-
-
-def _columns(sample: Sequence[str], separator: str | None) -> tuple[int, list[int]]:
-    """Return the number of columns, and those that hold numbers in most of the lines."""
-    split = [_cells(line, separator) for line in sample]
+    there = (mark for mark in SEPARATORS if mark is None or any(mark in line for line in sample))
+    dialect = max(map(Dialect, there), key=merit)
+    split = [dialect.cells(line) for line in sample]
     width, _ = max(Counter(map(len, split)).items(), key=lambda item: (item[1], item[0]))
-    full = [cells for cells in split if len(cells) == width]
-    held = [sum(_is_number(cells[k], separator) for cells in full) for k in range(width)]
-    return width, [k for k, count in enumerate(held) if 2 * count >= len(full)]
+    columns = zip(*(cells for cells in split if len(cells) == width), strict=True)
+    held = [[dialect.is_number(cell) for cell in column] for column in columns]
+    return dialect, width, [k for k, each in enumerate(held) if 2 * sum(each) >= len(each)]
 
 
-def _first_row(
-    path: Path,
-    numbered: Iterable[tuple[int, str]],
-    separator: str | None,
-    width: int,
-    numeric: Sequence[int],
-) -> int:
+def _first_row(table: TextTable, width: int, numeric: Sequence[int]) -> int:
     """Return which line is the first row; raises InputError where a line above may be one too."""
-    for k, (number, line) in enumerate(numbered):
-        cells = _cells(line, separator)
+    for k, row in enumerate(table.rows):
+        cells = table.dialect.cells(row)
         whole = len(cells) == width
-        good = [whole and _is_number(cells[column], separator) for column in numeric]
+        good = [whole and table.dialect.is_number(cells[column]) for column in numeric]
         if numeric and all(good):
             return k
-        if line.strip() and not whole and all(_is_number(cell, separator) for cell in cells):
+        if row.strip() and not whole and all(map(table.dialect.is_number, cells)):
             raise InputError(
-                f"{path}: line {number} has {len(cells)} columns, those below have {width}: correct"
-                f" the line, or give --skip-rows {number} where it is part of a heading"
+                f"{table.path}: line {table.lines[k]} has {len(cells)} columns, those below have"
+                f" {width}: correct the line, or give --skip-rows {table.lines[k]} where it is part"
+                " of a heading"
             )
         if any(good):
-            column = numeric[good.index(False)]
             raise InputError(
-                f"{path}: line {number}, column {column + 1}: '{cells[column]}' is not a number:"
-                f" correct the cell, or give --skip-rows {number} where the line is a heading"
+                f"{table.place(k, numeric[good.index(False)])} is not a number: correct the cell,"
+                f" or give --skip-rows {table.lines[k]} where the line is a heading"
             )
-    raise InputError(f"{path}: holds no rows of numbers: give columns of drive and displacement")
+    raise InputError(
+        f"{table.path}: holds no rows of numbers: give columns of drive and displacement"
+    )
 
 
-def _refuse_ragged(
-    path: Path,
-    numbers: NDArray[np.intp],
-    rows: Sequence[str],
-    separator: str | None,
-    *,
-    open_end: bool,
-) -> None:
+def _refuse_ragged(table: TextTable, *, open_end: bool) -> None:
     """Raise InputError unless rows have as many columns; one that no line end follows is whole."""
-    counts = [row.count(separator) + 1 if separator else len(row.split()) for row in rows]
-    last = f"{path}: line {numbers[-1]} is the last and has no line end"
-    for number, row, count in zip(numbers, rows, counts, strict=True):
-        if count < counts[0] and open_end and number == numbers[-1]:
-            raise InputError(f"{last}: it has {count} of {counts[0]} columns: {CUT}")
-        if count != counts[0] or not row.strip():
-            raise InputError(
-                f"{path}: line {number} has {count if row.strip() else 0} columns, line"
-                f" {numbers[0]} has {counts[0]}: correct the line, or leave a heading out with"
-                " --skip-rows"
-            )
-    if open_end and ends_within([_cells(row, separator)[-1] for row in rows]):
-        cell = _cells(rows[-1], separator)[-1]
+    mark = table.dialect.separator
+    counts = [row.count(mark) + 1 if mark else len(row.split()) for row in table.rows]
+    last = f"{table.path}: line {table.lines[-1]} is the last and has no line end"
+    wrong = next((k for k, count in enumerate(counts) if count != counts[0]), None)
+    if wrong == len(counts) - 1 and open_end and counts[-1] < counts[0]:
+        raise InputError(f"{last}: it has {counts[-1]} of {counts[0]} columns: {CUT}")
+    if wrong is not None:
+        count = counts[wrong] if table.rows[wrong].strip() else 0
+        raise InputError(
+            f"{table.path}: line {table.lines[wrong]} has {count} columns, line {table.lines[0]}"
+            f" has {counts[0]}: correct the line, or leave a heading out with --skip-rows"
+        )
+    if open_end and _loses_digits([table.dialect.cells(row)[-1] for row in table.rows]):
+        cell = table.dialect.cells(table.rows[-1])[-1]
         raise InputError(
             f"{last}: its '{cell}' has fewer digits than in every other row: {CUT}, or end it with"
             " a line end if it is whole"
         )
 
 
-def _names(heading: Sequence[str], separator: str | None, width: int) -> tuple[str, ...]:
+def _refuse_second_heading(table: TextTable) -> None:
+    """Raise InputError for a row without numbers: those above it are another table's."""
+    for number, row in zip(table.lines[:LOOKED], table.rows, strict=False):
+        if not any(map(table.dialect.is_number, table.dialect.cells(row))):
+            raise InputError(
+                f"{table.path}: line {number} holds no number: correct it, or give --skip-rows"
+                f" {number - 1} where it is the heading"
+            )
+
+
+def _loses_digits(cells: Sequence[str]) -> bool:
+    """Whether the last of a column's cells has lost digits, of its mantissa or its exponent.
+
+    It then ends a file whose writer was stopped. Many whole files have no end of line after their
+    last row, and a number cut short is a number too. But a row is written as the others are. Its
+    last number has fewer digits than in each of n other rows by chance in one of n + 1 files at
+    most.
+    """
+    found = [match for match in map(NUMBER.fullmatch, cells) if match]
+    mantissa = "fraction" if any(each["fraction"] for each in found) else "whole"
+    scaled = [each for each in found if each["exponent"]]
+    alike = scaled if found and found[-1]["exponent"] else found
+    for part, of in ((mantissa, found), ("exponent", alike)):
+        *others, last = [len(each[part] or "") for each in of] or [0]
+        if len(others) + 1 >= 1.0 / CHANCE and last < min(others):
+            return True
+    return False
+
+
+def _names(heading: Sequence[str], dialect: Dialect, width: int) -> tuple[str, ...]:
     """Return names of columns from the line nearest above the rows that has as many words.
 
     Where that is a line of units, these are put in brackets behind the names above it.
     """
-    units: tuple[str, ...] = ()
-    for line in reversed(heading):
-        found = _words(line.lstrip("".join(COMMENTS)).strip(" \r"), separator, width)
-        if not found:
-            continue
-        if not units and all(is_unit(word.strip("[]()")) for word in found):
-            units = found
-            continue
-        if units:
-            pairs = zip(found, units, strict=True)
-            return tuple(f"{name} [{unit.strip('[]()')}]" for name, unit in pairs)
-        return found
-    return ()
+    lines = (_words(line, dialect, width) for line in reversed(heading))
+    nearest, *above = [*islice(filter(None, lines), 2)] or [()]
+    units = [word.strip("[]()") for word in nearest]
+    if not all(map(is_unit, units)):
+        return nearest
+    pairs = (pair for names in above for pair in zip(names, units, strict=True))
+    return tuple(f"{name} [{unit}]" for name, unit in pairs)
 
 
-def _words(line: str, separator: str | None, width: int) -> tuple[str, ...]:
+def _words(line: str, dialect: Dialect, width: int) -> tuple[str, ...]:
     """Return the cells of a heading, empty where it has another number of them, or numbers."""
-    for mark in (separator, *SEPARATORS):
-        if mark is None:
-            cells = re.split(r"\s+(?![\[(])", line)
-        else:
-            cells = line.removesuffix(mark).split(mark)
+    text = line.lstrip("".join(COMMENTS)).strip(" \r")
+    for mark in (dialect.separator, *SEPARATORS):
+        cells = text.removesuffix(mark).split(mark) if mark else re.split(r"\s+(?![\[(])", text)
         words = tuple(cell.strip().strip('"').strip() for cell in cells)
-        numbers = any(_is_number(word, mark) for word in words)
-        if len(words) == width and any(words) and not numbers:
+        if len(words) == width and any(words) and not any(map(Dialect(mark).is_number, words)):
             return words
     return ()

@@ -133,5 +133,5 @@ def record(name: str, drive: Array, displacement: Array) -> Record:
 def columns(name: str, *numbers: int) -> tuple[Array, ...]:
     """Columns of a file: the first in V, the others from µm to m."""
     table = read_table(measured_data(f"{FOLDER}/{name}"))
-    drive, *displacements = (table.column(number - 1) for number in numbers)
+    drive, *displacements = table.columns([number - 1 for number in numbers])
     return drive, *(MICRO * displacement for displacement in displacements)
