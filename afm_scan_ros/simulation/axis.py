@@ -22,7 +22,7 @@ def quantity(*checks: Callable[..., Any], suffix: str = "", scale: float = 1.0) 
 
 @frozen
 class HysteresisSpec:
-    """Play operators of exponentially falling density between two quadratics (see play.py)."""
+    """Play operators of exponentially falling density between two quadratics."""
 
     elements: int = quantity(ge(1), le(10_000))
     threshold_max: float = quantity(gt(0.0), suffix="_v")
