@@ -6,7 +6,7 @@ from attrs import evolve
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.model import AxisModel, EverettSurface, HysteresisModel, ModelDiscrepancy
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Trace
 
 
 def scaled_axis(axis: AxisModel, scale: Scale) -> AxisModel:
@@ -49,6 +49,11 @@ def scaled_record(record: Record, scale: Scale) -> Record:
         sample_period=scale.time * record.sample_period,
         scan=evolve(spec, **changed),
     )
+
+
+def scaled_trace(trace: Trace, size: float, time: float) -> Trace:
+    """Trace of other units."""
+    return Trace(trace.first_sample, time * trace.sample_period, size * trace.x, size * trace.y)
 
 
 def _slowed(polynomial: tuple[float, ...], count: int, time: float) -> Array:
