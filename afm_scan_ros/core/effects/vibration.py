@@ -14,7 +14,7 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.lti import SampledSystem
 from afm_scan_ros.core.effects.optimal_inverse import (
     Kernel,
     MultipliedWeight,
@@ -115,28 +115,6 @@ class InverseDesign:
     before: VibrationModel | None = None
 
 
-@frozen(eq=False)
-class SampledSystem:
-    """x[k+1] = a x[k] + b u[k - delay], y[k] = c x[k], with shapes (n, n), (n,), (n,)."""
-
-    a: Array
-    b: Array
-    c: Array
-    sample_period: float
-    delay: int
-    """Whole samples by which the input comes late."""
-
-    def response(self, omega: Array) -> NDArray[np.complex128]:
-        """Y/U at angular frequencies ``omega`` in rad/s, same shape."""
-        z = np.exp(1j * omega * self.sample_period)
-        resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.b)) - self.a
-        forcing = np.broadcast_to(self.b[:, np.newaxis], (len(z), len(self.b), 1))
-        states = np.linalg.solve(resolvent, forcing)
-        result: NDArray[np.complex128] = (self.c.astype(complex) @ states)[:, 0]
-        late: NDArray[np.complex128] = z**-self.delay
-        return result * late
-
-
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     """Sample G behind a zero-order hold, exactly.
 
@@ -146,11 +124,12 @@ def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     whole, part = divmod(model.delay / sample_period, 1.0)
     a, late, c = _discrete(model, sample_period)
     if part == 0.0:
-        return SampledSystem(a, late, c, sample_period, int(whole))
+        return SampledSystem(a, late, c, 0.0, sample_period, int(whole))
     # Within a period the input before still acts for its first part, and is one more state.
     b = _discrete(model, (1.0 - part) * sample_period)[1]
     a = np.block([[a, (late - b)[:, np.newaxis]], [np.zeros((1, len(b) + 1))]])
-    return SampledSystem(a, np.append(b, 1.0), np.append(c, 0.0), sample_period, int(whole))
+    b, c = np.append(b, 1.0), np.append(c, 0.0)
+    return SampledSystem(a, b, c, 0.0, sample_period, int(whole))
 
 
 def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array]:
@@ -166,22 +145,6 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
     continuous[:degree, :degree], continuous[0, degree] = companion(denominator), 1.0
     discrete = expm(period * scale * continuous)
     return discrete[:degree, :degree], discrete[:degree, degree], read_out[0] / denominator[0]
-
-
-@compiled
-def _apply(a: Array, b: Array, c: Array, state: Array, block: Array, result: Array) -> None:
-    n = state.size
-    step = np.empty(n)
-    for k in range(block.size):
-        y = 0.0
-        for i in range(n):
-            y += c[i] * state[i]
-            new = b[i] * block[k]
-            for j in range(n):
-                new += a[i, j] * state[j]
-            step[i] = new
-        state[:] = step
-        result[k] = y
 
 
 class Vibration:
@@ -235,15 +198,11 @@ class Vibration:
 
     def at_rest(self) -> Array:
         """State at rest at zero, shape (n + delay,)."""
-        return np.zeros(len(self._system.b) + self._system.delay)
+        return self._system.at_rest()
 
     def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement (m) under a block of held inputs (V), both (n,)."""
-        order, system = len(self._system.b), self._system
-        inner, result = state[:order].copy(), np.empty_like(block)
-        inputs = np.concatenate((state[order:], block))
-        _apply(system.a, system.b, system.c, inner, inputs[: len(block)], result)
-        return np.concatenate((inner, inputs[len(block) :])), result
+        return self._system.apply(state, block)
 
     def inverse_at_rest(self) -> Array:
         """State of the inverse before sample 0: every earlier target was zero."""
