@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
+from afm_scan_ros.core.coupled_system import SampledCoupling
+from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, OutputMap
 from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
@@ -35,7 +36,7 @@ class Stage:
     """
 
     elements: tuple[ChainElement[AnyEffect], ...]
-    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
+    coupling: tuple[Element[SampledCoupling], ...] = ()
 
     def at(self, sample_period: float) -> Cascade:
         """Return the effects of the elements at a sample period (s)."""
@@ -61,7 +62,7 @@ class Chain:
     drive: tuple[ChainElement[AnyEffect], ...] = ()
     hysteresis: Element[AnyEffect] = RATE_INDEPENDENT
     output: tuple[ChainElement[AnyEffect], ...] = ()
-    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
+    coupling: tuple[Element[SampledCoupling], ...] = ()
     before: VibrationModel | None = None
     """The vibration, where an effect has come to multiply it and all that the model lacks."""
     elsewhere: tuple["Chain", ...] = ()
@@ -89,7 +90,7 @@ class Chain:
             raise InputError("the hysteresis is replaced already: keep one of the two")
         return evolve(self, hysteresis=element)
 
-    def with_coupling(self, element: ChainElement[CouplingEffect]) -> "Chain":
+    def with_coupling(self, element: Element[SampledCoupling]) -> "Chain":
         """Chain to which the other axis adds one thing more."""
         return evolve(self, coupling=(*self.coupling, element))
 

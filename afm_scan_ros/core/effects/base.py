@@ -11,7 +11,6 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.types import Array
 
 ForwardState = TypeVar("ForwardState")
@@ -143,20 +142,3 @@ class Element(Generic[E]):
     def at(self, sample_period: float) -> E:
         """Return the effect at a sample period (s)."""
         return self.make(*self.parameters, sample_period)
-
-
-class CouplingEffect(Protocol):
-    """What the other axis adds to this one, at one sample period."""
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of one sample, by which the coupling of both axes is inverted."""
-        ...
-
-    def at_rest(self) -> Any:  # noqa: ANN401 - each effect's own
-        """State before the first sample."""
-        ...
-
-    def apply(self, state: Any, other: Array) -> tuple[Any, Array]:  # noqa: ANN401 - its own
-        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
-        ...

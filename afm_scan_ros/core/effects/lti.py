@@ -7,7 +7,7 @@ Re c e^{pt} during a hold of length T. The hysteresis takes its voltage as held 
 it gets the mean v over each hold, which is exact for all that is slow beside T. With z = e^{pT} and
 m = -(1 + j Re p / Im p) (1 - z) / (pT), or (z - 1) / (pT) for a real pole:
 
-    x[k+1] = z x[k] + (1 - z) u[k],    v[k] = Re m x[k] + (1 - Re m) u[k]
+    x[k+1] = z x[k] + (1 - z) u[k],    v[k] = Re(m x[k]) + (1 - Re m) u[k]
 
 Of a lag x is the voltage at the end of the last hold.
 
