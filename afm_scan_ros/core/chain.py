@@ -7,6 +7,7 @@ See scanner.py for what the axes add to each other.
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 from attrs import evolve, frozen
 
@@ -71,6 +72,24 @@ class Chain:
     def of_record(self, number: int) -> "Chain":
         """Return the chain of a record."""
         return self.elsewhere[number - 1] if number and self.elsewhere else self
+
+    def with_model(self, **effects: Any) -> "Chain":  # noqa: ANN401 - each effect's own
+        """Chain of which the model has other effects."""
+        return evolve(self, model=evolve(self.model, **effects))
+
+    def with_vibration(self, **changed: Any) -> "Chain":  # noqa: ANN401 - as of evolve
+        """Chain of which the vibration has another numerator, denominator or delay."""
+        return self.with_model(vibration=evolve(self.model.vibration, **changed))
+
+    def multiplied(self, numerator: Iterable[float], denominator: Iterable[float]) -> "Chain":
+        """Chain of which the vibration has other polynomials, by an effect that multiplies it.
+
+        It multiplies what the model lacks too, so the inverse keeps to the motion that its weight
+        was chosen for: a mode beyond the model would ring the more, the more the inverse passed
+        there.
+        """
+        changed = self.with_vibration(numerator=numerator, denominator=denominator)
+        return evolve(changed, before=self.before or self.model.vibration)
 
     def with_drive(self, element: ChainElement[AnyEffect]) -> "Chain":
         """Chain with one more element between the amplifier's input and the hysteresis.

@@ -30,8 +30,7 @@ from afm_scan_ros.core.effects.residual_features import (
     amounts,
     likely_modes,
 )
-from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
-from afm_scan_ros.core.effects.vibration import VibrationModel, held
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance, held, resonant
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -88,8 +87,8 @@ def insert_coupled_mode(chain: Chain, values: Array) -> Chain:
     mode = resonant(2.0 * np.pi * frequency, damping)
     pull = share * first.omega**2 * np.array([*mode[:-1], 0.0])
     coupled = np.polyadd(np.polymul(first.factor, mode), pull)
-    loaded = with_vibration(
-        chain, np.polymul(base.numerator, mode), np.polymul(first.rest, coupled)
+    loaded = chain.with_vibration(
+        numerator=np.polymul(base.numerator, mode), denominator=np.polymul(first.rest, coupled)
     )
     structure = VibrationModel([first.omega**2 * mode[-1]], coupled)
     return _with_structure(loaded, share, structure)

@@ -38,13 +38,7 @@ from afm_scan_ros.core.effects.residual_features import (
     ResidualFeatures,
     likely_modes,
 )
-from afm_scan_ros.core.effects.resonance import (
-    first_resonance,
-    multiplied,
-    resonant,
-    with_vibration,
-)
-from afm_scan_ros.core.effects.vibration import OSCILLATES
+from afm_scan_ros.core.effects.vibration import OSCILLATES, first_resonance, resonant
 from afm_scan_ros.core.types import Array
 
 FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0, excited=True)
@@ -76,7 +70,7 @@ def insert_series_mode(chain: Chain, values: Array) -> Chain:
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     riding = np.polyadd(mode, [mass, 0.0, 0.0])
-    return multiplied(chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
+    return chain.multiplied(np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
 
 
 def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
@@ -85,8 +79,7 @@ def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
     base, mode = chain.model.vibration, _mode(frequency, damping)
     pull = mass * np.polymul([1.0, 0.0, 0.0], mode[1:])
     loaded = np.polymul(first_resonance(base).rest, pull)
-    return multiplied(
-        chain,
+    return chain.multiplied(
         np.polymul(base.numerator, mode),
         np.polyadd(np.polymul(base.denominator, mode), loaded),
     )
@@ -97,10 +90,9 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
     share, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     beside = share * base.static_gain * mode[-1] * np.array(base.denominator)
-    return with_vibration(
-        chain,
-        np.polyadd(np.polymul(base.numerator, mode), beside),
-        np.polymul(base.denominator, mode),
+    return chain.with_vibration(
+        numerator=np.polyadd(np.polymul(base.numerator, mode), beside),
+        denominator=np.polymul(base.denominator, mode),
     )
 
 

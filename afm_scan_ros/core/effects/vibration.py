@@ -96,6 +96,39 @@ class VibrationModel:
         return float(slowest / (2.0 * np.pi))
 
 
+def resonant(omega: float, damping: float) -> Array:
+    """Return s² + 2 damping omega s + omega², omega in rad/s."""
+    return np.array([1.0, 2.0 * damping * omega, omega**2])
+
+
+@frozen
+class Resonance:
+    """G's denominator is ``rest`` times s² + 2 ``damping`` ``omega`` s + ``omega``² (rad/s)."""
+
+    omega: float
+    damping: float
+    rest: tuple[float, ...] = field(converter=floats)
+
+    @property
+    def frequency(self) -> float:
+        """Frequency without damping, Hz."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
+    def factor(self) -> Array:
+        """Its polynomial in descending powers of s, shape (3,)."""
+        return resonant(self.omega, self.damping)
+
+
+def first_resonance(vibration: VibrationModel) -> Resonance:
+    """Return the resonance that rises highest; raises InputError where there is none."""
+    if (pole := vibration.resonant_pole) is None:
+        raise InputError("the vibration model has no resonance: leave out effects that act on one")
+    omega, damping = abs(pole), -pole.real / abs(pole)
+    rest = np.polydiv(vibration.denominator, resonant(omega, damping))[0]
+    return Resonance(omega, damping, rest)
+
+
 LARGEST_TAIL = 1e-4
 """Share of the inverse's response that may lie ahead of the preview."""
 PERIODS = 9.0

@@ -30,8 +30,7 @@ from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Observation
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.model import AxisModel, BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of

@@ -20,8 +20,12 @@ from afm_scan_ros.core.effects.hysteretic_stiffness import (
     spectrum,
 )
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import (
+    LARGEST_TAIL,
+    Vibration,
+    VibrationModel,
+    first_resonance,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import InverseSettings
 
