@@ -11,12 +11,11 @@ from typing import Any
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.coupled_system import SampledCoupling
-from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, Element, Gain
+from afm_scan_ros.core.effects.base import AnyEffect, Cascade, ChainElement, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, OutputMap
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AS_IDENTIFIED,
@@ -166,8 +165,8 @@ class Chain:
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
         """Return the vibration whose inverse is designed by the ``settings``."""
-        design = InverseDesign(settings.weight, settings.preview, self.before)
-        return Vibration(self.model.vibration, sample_period, design)
+        design = settings.weight, settings.preview, self.before
+        return Vibration(self.model.vibration, sample_period, *design)
 
     def hysteresis_of(self, operator: HysteresisOperator) -> Element[AnyEffect]:
         """Return the hysteresis with an operator."""

@@ -49,7 +49,7 @@ class SampledCoupling(SampledSystem):
     @property
     def system(self) -> System:
         """Return a, b, c, share and curvature, as compiled code takes them."""
-        return self.a, self.b, self.c, float(self.d), float(self.curvature)
+        return self.a, self.b, self.c, self.d, float(self.curvature)
 
 
 def memoryless(share: float, curvature: float, sample_period: float) -> SampledCoupling:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import CoupledSystem, sum_of
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel

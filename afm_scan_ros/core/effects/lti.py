@@ -66,7 +66,7 @@ class SampledSystem:
     a: Array = field(converter=np.ascontiguousarray)
     b: Array = field(converter=np.ascontiguousarray)
     c: Array = field(converter=np.ascontiguousarray)
-    d: float
+    d: float = field(converter=float)
     sample_period: float
     delay: int = 0
 

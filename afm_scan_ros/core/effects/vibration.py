@@ -136,18 +136,6 @@ PERIODS = 9.0
 scanner lies ahead of it, 1e-11 on the default plant."""
 
 
-@frozen
-class InverseDesign:
-    """How to invert: weight, and preview (s), which is as long as the inverse needs where None.
-
-    ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
-    """
-
-    weight: Weight | RelativeWeight = field(factory=RelativeWeight)
-    preview: float | None = None
-    before: VibrationModel | None = None
-
-
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     """Sample G behind a zero-order hold, exactly.
 
@@ -184,31 +172,38 @@ class Vibration:
     """Vibration of one axis; the state is that of the sampled system, then the inputs delayed.
 
     The inverse is the optimal one, designed when first asked for; what it declares is the
-    modified trajectory of the paper's Eq. 22, exact at rest.
+    modified trajectory of the paper's Eq. 22, exact at rest. Its ``preview`` (s) is as long as it
+    needs where None. ``before`` is the vibration that the weight was chosen for, where another one
+    multiplies it.
     """
 
     def __init__(
-        self, model: VibrationModel, sample_period: float, design: InverseDesign | None = None
+        self,
+        model: VibrationModel,
+        sample_period: float,
+        weight: Weight | RelativeWeight | None = None,
+        preview: float | None = None,
+        before: VibrationModel | None = None,
     ) -> None:
         self._system = held(model, sample_period)
         self._model, self._sample_period = model, sample_period
-        self._design = design or InverseDesign()
+        self._chosen, self._given, self._before = weight or RelativeWeight(), preview, before
 
     @cached_property
     def inverse(self) -> OptimalInverse:
-        """The optimal inverse by the design.
+        """The optimal inverse by its weight.
 
-        Raises InputError where its response does not die out, or where the design's preview cuts
-        off what the inverse needs of the targets ahead.
+        Raises InputError where its response does not die out, or where the preview given cuts off
+        what the inverse needs of the targets ahead.
         """
         kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
-        return OptimalInverse(kernel, self._preview(kernel, self._design.preview))
+        return OptimalInverse(kernel, self._preview(kernel, self._given))
 
     def _weight(self) -> Weight:
-        weight, chosen_for = self._design.weight, self._design.before or self._model
+        weight, chosen_for = self._chosen, self._before or self._model
         if isinstance(weight, RelativeWeight):
             weight = weight.at(chosen_for.natural_frequency)
-        if self._design.before is None:
+        if self._before is None:
             return weight
         response, before = self._system.response, held(chosen_for, self._sample_period).response
         return MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.hysteretic_stiffness import (
     ELEMENTS,
     KNOTS,
