@@ -150,6 +150,25 @@ class StatelessEffect(CausalInverse):
         return None, self.input(block)
 
 
+LEVELS, NEWTON_STEPS = 2049, 3
+"""Of the table that a rising curve is solved from, and what follows it:
+each step squares the error, two reach rounding."""
+
+
+def solved(
+    curve: Callable[[Array], tuple[Array, Array]], levels: Array, heights: Array, wanted: Array
+) -> Array:
+    """Where a rising curve has the heights ``wanted`` (n,), by Newton's method from a table of it.
+
+    ``curve`` gives height and slope, and goes on straight beyond its ``levels``.
+    """
+    found = np.interp(wanted, heights, levels)
+    for _ in range(NEWTON_STEPS):
+        height, slope = curve(found)
+        found = found - (height - wanted) / slope
+    return found
+
+
 @frozen
 class Gain(StatelessEffect):
     """A gain, in the unit of the output over that of the input, in the place of an effect."""
