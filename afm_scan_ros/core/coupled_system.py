@@ -41,7 +41,7 @@ class SampledCoupling(SampledSystem):
 
     def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
         """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
-        after, added = super().apply(state, block)
+        after, added = super().apply(state, block) if len(state) else (state, self.d * block)
         if self.curvature:
             added += 0.5 * self.curvature * block**2
         return after, added
