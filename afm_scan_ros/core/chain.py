@@ -7,14 +7,15 @@ See scanner.py for what the axes add to each other.
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.base import AnyEffect, ChainElement, CouplingEffect, Element, Gain
+from afm_scan_ros.core.coupled_system import SampledCoupling
+from afm_scan_ros.core.effects.base import AnyEffect, Cascade, ChainElement, Element, Gain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, OutputMap
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     AS_IDENTIFIED,
@@ -35,7 +36,7 @@ class Stage:
     """
 
     elements: tuple[ChainElement[AnyEffect], ...]
-    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
+    coupling: tuple[Element[SampledCoupling], ...] = ()
 
     def at(self, sample_period: float) -> Cascade:
         """Return the effects of the elements at a sample period (s)."""
@@ -61,7 +62,7 @@ class Chain:
     drive: tuple[ChainElement[AnyEffect], ...] = ()
     hysteresis: Element[AnyEffect] = RATE_INDEPENDENT
     output: tuple[ChainElement[AnyEffect], ...] = ()
-    coupling: tuple[ChainElement[CouplingEffect], ...] = ()
+    coupling: tuple[Element[SampledCoupling], ...] = ()
     before: VibrationModel | None = None
     """The vibration, where an effect has come to multiply it and all that the model lacks."""
     elsewhere: tuple["Chain", ...] = ()
@@ -70,6 +71,24 @@ class Chain:
     def of_record(self, number: int) -> "Chain":
         """Return the chain of a record."""
         return self.elsewhere[number - 1] if number and self.elsewhere else self
+
+    def with_model(self, **effects: Any) -> "Chain":  # noqa: ANN401 - each effect's own
+        """Chain of which the model has other effects."""
+        return evolve(self, model=evolve(self.model, **effects))
+
+    def with_vibration(self, **changed: Any) -> "Chain":  # noqa: ANN401 - as of evolve
+        """Chain of which the vibration has another numerator, denominator or delay."""
+        return self.with_model(vibration=evolve(self.model.vibration, **changed))
+
+    def multiplied(self, numerator: Iterable[float], denominator: Iterable[float]) -> "Chain":
+        """Chain of which the vibration has other polynomials, by an effect that multiplies it.
+
+        It multiplies what the model lacks too, so the inverse keeps to the motion that its weight
+        was chosen for: a mode beyond the model would ring the more, the more the inverse passed
+        there.
+        """
+        changed = self.with_vibration(numerator=numerator, denominator=denominator)
+        return evolve(changed, before=self.before or self.model.vibration)
 
     def with_drive(self, element: ChainElement[AnyEffect]) -> "Chain":
         """Chain with one more element between the amplifier's input and the hysteresis.
@@ -89,7 +108,7 @@ class Chain:
             raise InputError("the hysteresis is replaced already: keep one of the two")
         return evolve(self, hysteresis=element)
 
-    def with_coupling(self, element: ChainElement[CouplingEffect]) -> "Chain":
+    def with_coupling(self, element: Element[SampledCoupling]) -> "Chain":
         """Chain to which the other axis adds one thing more."""
         return evolve(self, coupling=(*self.coupling, element))
 
@@ -146,8 +165,8 @@ class Chain:
 
     def vibration(self, sample_period: float, settings: InverseSettings) -> Vibration:
         """Return the vibration whose inverse is designed by the ``settings``."""
-        design = InverseDesign(settings.weight, settings.preview, self.before)
-        return Vibration(self.model.vibration, sample_period, design)
+        design = settings.weight, settings.preview, self.before
+        return Vibration(self.model.vibration, sample_period, *design)
 
     def hysteresis_of(self, operator: HysteresisOperator) -> Element[AnyEffect]:
         """Return the hysteresis with an operator."""

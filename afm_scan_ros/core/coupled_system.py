@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.lti import SampledSystem
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array, Trace
 
@@ -30,34 +31,40 @@ System = tuple[Array, Array, Array, float, float]
 
 
 @frozen(eq=False)
-class SampledCoupling:
-    """What the other axis o (m) adds, in m: states z (n,), see above; none where n is 0."""
+class SampledCoupling(SampledSystem):
+    """What the other axis o (m) adds, in m: a linear system of o, of share d, and an arc.
 
-    a: Array
-    b: Array
-    c: Array
-    share: float
-    curvature: float
+    The arc has a ``curvature`` (1/m).
+    """
 
-    @classmethod
-    def without_memory(cls, share: float, curvature: float = 0.0) -> "SampledCoupling":
-        """Return a coupling that adds share o + curvature o² / 2."""
-        return cls(np.empty((0, 0)), np.empty(0), np.empty(0), share, curvature)
+    curvature: float = 0.0
 
-    @classmethod
-    def sum_of(cls, parts: Iterable["SampledCoupling"]) -> "SampledCoupling":
-        """Return one coupling that adds what all ``parts`` add."""
-        a, b, c, shares, curvatures = zip(
-            *((p.a, p.b, p.c, p.share, p.curvature) for p in parts), strict=True
-        )
-        return cls(
-            block_diag(*a), np.concatenate(b), np.concatenate(c), sum(shares), sum(curvatures)
-        )
+    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
+        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
+        after, added = super().apply(state, block) if len(state) else (state, self.d * block)
+        if self.curvature:
+            added += 0.5 * self.curvature * block**2
+        return after, added
 
     @property
     def system(self) -> System:
         """Return a, b, c, share and curvature, as compiled code takes them."""
-        return self.a, self.b, self.c, float(self.share), float(self.curvature)
+        return self.a, self.b, self.c, self.d, float(self.curvature)
+
+
+def memoryless(share: float, curvature: float, sample_period: float) -> SampledCoupling:
+    """Return a coupling that adds share o + curvature o² / 2."""
+    a, b = np.empty((0, 0)), np.empty(0)
+    return SampledCoupling(a, b, b, share, sample_period, curvature=curvature)
+
+
+def sum_of(parts: Iterable[SampledCoupling], sample_period: float) -> SampledCoupling:
+    """Return one coupling that adds what all ``parts`` add."""
+    a, b, c, shares, curvatures = zip(
+        *(each.system for each in (memoryless(0.0, 0.0, sample_period), *parts)), strict=True
+    )
+    linear = block_diag(*a), np.concatenate(b), np.concatenate(c), sum(shares)
+    return SampledCoupling(*linear, sample_period, curvature=sum(curvatures))
 
 
 @frozen(eq=False)
@@ -110,13 +117,13 @@ def _modes_of_inverse(to_x: SampledCoupling, to_y: SampledCoupling) -> NDArray[n
 
     Raises InputError where the shares alone leave no inverse.
     """
-    left = 1.0 - to_x.share * to_y.share
+    left = 1.0 - to_x.d * to_y.d
     if not left > 0.0:
         raise InputError(
-            f"cross_coupling: the axes add shares of {to_x.share:.3g} and {to_y.share:.3g} to each"
+            f"cross_coupling: the axes add shares of {to_x.d:.3g} and {to_y.d:.3g} to each"
             " other at once, whose product must be below 1: choose smaller ones"
         )
-    mixed = np.array([[1.0, -to_x.share], [-to_y.share, 1.0]]) / left
+    mixed = np.array([[1.0, -to_x.d], [-to_y.d, 1.0]]) / left
     free = block_diag(to_x.a, to_y.a)
     seen = block_diag(to_x.c[np.newaxis], to_y.c[np.newaxis])
     driven = block_diag(to_x.b[:, np.newaxis], to_y.b[:, np.newaxis])[:, ::-1]

@@ -19,8 +19,7 @@ from attrs import evolve, field, fields, frozen
 from attrs.converters import optional as optional_converter
 from attrs.validators import ge, in_, optional
 
-from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.base import AnyEffect
+from afm_scan_ros.core.effects.base import AnyEffect, Cascade
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface

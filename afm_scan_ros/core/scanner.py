@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.coupled_system import CoupledSystem, SampledCoupling
+from afm_scan_ros.core.coupled_system import CoupledSystem, sum_of
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
@@ -47,13 +47,13 @@ def compensator(
     return chain_of(axis).compensator(sample_period, inverses, settings)
 
 
-States = dict[str, tuple[Any, ...]]
+States = dict[str, Array]
 InverseState = Any
 """``States`` where one axis adds to the other, ``CoupledState`` where both do."""
 
 
 class Coupling:
-    """Coupling of both axes; the state holds those of each axis' coupling elements.
+    """Coupling of both axes; the state is that of what is added to each.
 
     ``axes`` are those to which the other adds something that counts.
     """
@@ -62,13 +62,16 @@ class Coupling:
         self, model: ScannerModel, sample_period: float, axes: Collection[str] = AXES
     ) -> None:
         added = {n: chain_of(model.axis(n)).coupling if n in axes else () for n in AXES}
-        self._elements = {n: tuple(e.at(sample_period) for e in added[n]) for n in AXES}
-        self._none = not any(self._elements.values())
+        self._to = {
+            name: sum_of((each.at(sample_period) for each in elements), sample_period)
+            for name, elements in added.items()
+        }
+        self._none, self._both = not any(added.values()), all(added.values())
         self._sample_period = sample_period
 
     def at_rest(self) -> States:
         """State of a scanner that has long rested at zero."""
-        return {name: tuple(e.at_rest() for e in self._elements[name]) for name in AXES}
+        return {name: added.at_rest() for name, added in self._to.items()}
 
     def apply(self, state: States, own: Trace) -> tuple[States, Trace]:
         """Displacement (m) of both axes for the own displacement of each."""
@@ -80,10 +83,9 @@ class Coupling:
     @cached_property
     def _coupled(self) -> CoupledSystem | None:
         """Both axes' equations, where each axis adds to the other."""
-        if not all(self._elements.values()):
+        if not self._both:
             return None
-        to_x, to_y = (SampledCoupling.sum_of(e.sampled for e in self._elements[n]) for n in AXES)
-        return CoupledSystem(to_x, to_y, self._sample_period)
+        return CoupledSystem(self._to["x"], self._to["y"], self._sample_period)
 
     def inverse_at_rest(self) -> InverseState:
         """State of the inverse at rest at zero. Raises InputError where the inverse is unstable."""
@@ -105,17 +107,9 @@ class Coupling:
 
     def _added(self, state: States, own: Trace) -> tuple[States, tuple[Array, Array]]:
         """States after, and what is added to x and to y (m)."""
-        x_after, to_x = self._added_to("x", state, own.y)
-        y_after, to_y = self._added_to("y", state, own.x)
+        x_after, to_x = self._to["x"].apply(state["x"], own.y)
+        y_after, to_y = self._to["y"].apply(state["y"], own.x)
         return {"x": x_after, "y": y_after}, (to_x, to_y)
-
-    def _added_to(self, axis: str, state: States, other: Array) -> tuple[tuple[Any, ...], Array]:
-        after, total = [], 0.0 * other
-        for element, before in zip(self._elements[axis], state[axis], strict=True):
-            new, part = element.apply(before, other)
-            after.append(new)
-            total = total + part
-        return tuple(after), total
 
 
 @frozen(eq=False)

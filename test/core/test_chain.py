@@ -6,10 +6,10 @@ import pytest
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.coupled_system import memoryless
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.effects.base import Element, Gain, StatelessEffect
 from afm_scan_ros.core.effects.creep import Creep
-from afm_scan_ros.core.effects.cross_coupling import MemorylessCoupling
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
@@ -76,7 +76,7 @@ def test_a_later_output_element_stands_behind_the_earlier() -> None:
 
 def test_an_output_element_meets_what_the_other_axis_adds_too() -> None:
     """Springs that yield, a play or a sensor feel where the axis is, whatever moved it there."""
-    share = MemorylessCoupling(0.1)
+    share = Element(memoryless, (0.1, 0.0))
     x = CHAIN.with_output(Gain(0.5)).with_output(Shift(1e-6))
     x = evolve(x, coupling=(share,))
     other = np.random.default_rng(2).normal(0.0, 1e-6, 400)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.effects.cross_coupling import DynamicCoupling
+from afm_scan_ros.core.effects.cross_coupling import by_structure
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import Added, ScannerModel, VibrationModel
 from afm_scan_ros.core.scanner import Coupling
@@ -200,7 +200,7 @@ def test_equations_that_rounding_leaves_unsolved_are_refused() -> None:
 
 def test_a_structure_with_a_delay_is_refused() -> None:
     with pytest.raises(InputError, match="delay"):
-        DynamicCoupling(0.05, VibrationModel([1e6], [1.0, 100.0, 1e6], 1e-4), PERIOD)
+        by_structure(0.05, VibrationModel([1e6], [1.0, 100.0, 1e6], 1e-4), PERIOD)
 
 
 @pytest.mark.parametrize("frequency", [40.0, 300.0, 3000.0])
@@ -210,7 +210,7 @@ def test_a_structure_between_the_axes_follows_as_driven_between_samples_too(
     """Golden: scipy's exact answer to an input that is straight between samples."""
     omega, damping, other = 2.0 * np.pi * frequency, 0.02, motion(3).x
     system = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
-    element = DynamicCoupling(0.05, VibrationModel(*system), PERIOD)
+    element = by_structure(0.05, VibrationModel(*system), PERIOD)
     found = element.apply(element.at_rest(), other)[1]
     expected = 0.05 * signal.lsim(system, other, PERIOD * np.arange(len(other)))[1]
     assert np.abs(found - expected).max() <= 2e-3 * np.abs(expected).max()

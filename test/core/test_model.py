@@ -6,7 +6,7 @@ import numpy as np
 import paper
 import pytest
 
-from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
     INVERSES,

@@ -21,7 +21,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import known_freedom, known_variance, weights
 from afm_scan_ros.core.effects.parameter_shift import insert_resonance
-from afm_scan_ros.core.effects.resonance import first_resonance, with_vibration
+from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -101,7 +101,7 @@ def _of_creep(chain: Chain) -> Values:
     def changed(key: str, place: int, chain: Chain, value: float) -> Chain:
         values = list(getattr(creep, key))
         values[place] = value
-        return evolve(chain, model=evolve(chain.model, creep=evolve(creep, **{key: values})))
+        return chain.with_model(creep=evolve(creep, **{key: values}))
 
     for key, name, least in (("gains", "gain", -np.inf), ("time_constants", "time_constant", 0.0)):
         for place, value in enumerate(getattr(creep, key)):
@@ -126,6 +126,5 @@ def _of_vibration(chain: Chain) -> Values:
 
 
 def _with_lag(chain: Chain, lag: float) -> Chain:
-    vibration = chain.model.vibration
-    still = vibration.denominator[-1]
-    return with_vibration(chain, vibration.numerator, (lag * still, still))
+    still = chain.model.vibration.denominator[-1]
+    return chain.with_vibration(denominator=(lag * still, still))

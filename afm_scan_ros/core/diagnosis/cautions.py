@@ -24,9 +24,8 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
-from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.scale import length_scale
-from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start

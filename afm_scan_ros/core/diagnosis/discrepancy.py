@@ -260,7 +260,7 @@ def error_between_levels(playback: Playback, chain: Chain) -> Array:
     chain = evolve(chain, hysteresis=RATE_INDEPENDENT)
     hysteresis = chain.model.hysteresis
     rounded = evolve(hysteresis, forward=smooth(hysteresis.surface))
-    other = evolve(chain, model=evolve(chain.model, hysteresis=rounded))
+    other = chain.with_model(hysteresis=rounded)
     afresh = Playback(playback.view, playback.initial_state)
     return playback.displacement(chain) - afresh.displacement(other)
 

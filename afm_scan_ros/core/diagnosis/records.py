@@ -10,8 +10,8 @@ rest.
 import numpy as np
 from attrs import define, field, frozen
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain, Stage
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, floats

@@ -11,7 +11,6 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.coupled_system import SampledCoupling
 from afm_scan_ros.core.types import Array
 
 ForwardState = TypeVar("ForwardState")
@@ -56,6 +55,52 @@ class Effect(Protocol[ForwardState, InverseState]):
 
 
 AnyEffect = Effect[Any, Any]
+
+
+States = tuple[Any, ...]
+
+
+@frozen
+class Cascade:
+    """Effects in the order in which the signal passes them; itself an Effect.
+
+    Inverting walks them from the last to the first: Croft, Shed and Devasia (2001), Eq. 23. An
+    effect that looks ahead hands on fewer samples at first, so blocks vary in length inside.
+    """
+
+    effects: tuple[AnyEffect, ...]
+
+    def at_rest(self) -> States:
+        """States of all effects, in their order."""
+        return tuple(effect.at_rest() for effect in self.effects)
+
+    def apply(self, state: States, block: Array) -> tuple[States, Array]:
+        """Output of the last effect for a block of input to the first, both (n,)."""
+        states = []
+        for effect, before in zip(self.effects, state, strict=True):
+            after, block = effect.apply(before, block)
+            states.append(after)
+        return tuple(states), block
+
+    def inverse_at_rest(self) -> States:
+        """States of all inverses, in the order of the effects."""
+        return tuple(effect.inverse_at_rest() for effect in self.effects)
+
+    def invert(self, state: States, block: Array) -> tuple[States, Array]:
+        """Input to the first effect whose output from the last follows ``block``."""
+        states = []
+        for effect, before in zip(self.effects[::-1], state[::-1], strict=True):
+            after, block = effect.invert(before, block)
+            states.append(after)
+        return tuple(states[::-1]), block
+
+    def finish(self, state: States) -> Array:
+        """Return the samples still owed: each inverse's, passed on through those after it."""
+        owed = np.empty(0)
+        for effect, before in zip(self.effects[::-1], state[::-1], strict=True):
+            after, passed = effect.invert(before, owed)
+            owed = np.concatenate((passed, effect.finish(after)))
+        return owed
 
 
 class CausalInverse(ABC):
@@ -105,6 +150,25 @@ class StatelessEffect(CausalInverse):
         return None, self.input(block)
 
 
+LEVELS, NEWTON_STEPS = 2049, 3
+"""Of the table that a rising curve is solved from, and what follows it:
+each step squares the error, two reach rounding."""
+
+
+def solved(
+    curve: Callable[[Array], tuple[Array, Array]], levels: Array, heights: Array, wanted: Array
+) -> Array:
+    """Where a rising curve has the heights ``wanted`` (n,), by Newton's method from a table of it.
+
+    ``curve`` gives height and slope, and goes on straight beyond its ``levels``.
+    """
+    found = np.interp(wanted, heights, levels)
+    for _ in range(NEWTON_STEPS):
+        height, slope = curve(found)
+        found = found - (height - wanted) / slope
+    return found
+
+
 @frozen
 class Gain(StatelessEffect):
     """A gain, in the unit of the output over that of the input, in the place of an effect."""
@@ -143,20 +207,3 @@ class Element(Generic[E]):
     def at(self, sample_period: float) -> E:
         """Return the effect at a sample period (s)."""
         return self.make(*self.parameters, sample_period)
-
-
-class CouplingEffect(Protocol):
-    """What the other axis adds to this one, at one sample period."""
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of one sample, by which the coupling of both axes is inverted."""
-        ...
-
-    def at_rest(self) -> Any:  # noqa: ANN401 - each effect's own
-        """State before the first sample."""
-        ...
-
-    def apply(self, state: Any, other: Array) -> tuple[Any, Array]:  # noqa: ANN401 - its own
-        """What a block of the other axis' own displacement (m) adds to this one (m), both (n,)."""
-        ...

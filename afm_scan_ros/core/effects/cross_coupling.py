@@ -16,13 +16,12 @@ c, m and ζ are dimensionless, κ is in 1/m, f in Hz. Assumption: this axis does
 """
 
 from collections.abc import Iterator
-from typing import Self
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.coupled_system import SampledCoupling
+from afm_scan_ros.core.coupled_system import SampledCoupling, memoryless
 from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import (
@@ -31,8 +30,7 @@ from afm_scan_ros.core.effects.residual_features import (
     amounts,
     likely_modes,
 )
-from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
-from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance, held, resonant
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -44,78 +42,30 @@ DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
 CURVATURE = EffectParameter("curvature", "1/m", -5e3, 5e3, 0.1)
 
 
-@frozen
-class MemorylessCoupling:
-    """A share of the other axis, and an arc of a ``curvature`` (1/m) on which it swings."""
+def by_structure(share: float, structure: VibrationModel, sample_period: float) -> SampledCoupling:
+    """Return a share of what a structure makes of the other axis; the states: its, and last sample.
 
-    share: float
-    curvature: float = 0.0
-
-    def at(self, sample_period: float) -> Self:  # noqa: ARG002 - the same at each
-        """Return the coupling at a sample period (s)."""
-        return self
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of a sample."""
-        return SampledCoupling.without_memory(self.share, self.curvature)
-
-    def at_rest(self) -> None:
-        """Return no state."""
-
-    def apply(self, state: None, other: Array) -> tuple[None, Array]:  # noqa: ARG002 - the protocol's
-        """What the other axis' displacement adds, both (n,) in m."""
-        return None, self.share * other + 0.5 * self.curvature * other**2
-
-
-class DynamicCoupling:
-    """A share of what a structure makes of the other axis; the state: its own, and the last sample.
-
-    Between samples the other axis is taken to move
-    straight, so each period drives the structure by the mean of its two ends.
-    Raises InputError for a structure with a delay.
+    Between samples the other axis is taken to move straight, so each period drives the structure by
+    the mean of its two ends. Raises InputError for a structure with a delay.
     """
-
-    def __init__(self, share: float, structure: VibrationModel, sample_period: float) -> None:
-        if structure.delay:
-            raise InputError("cross_coupling: a structure between the axes cannot have a delay")
-        self.share = share
-        self.structure = structure
-        self._moved = Vibration(structure, sample_period)
-        self._sample_period = sample_period
-
-    @property
-    def sampled(self) -> SampledCoupling:
-        """Equations of a sample; the states are the structure's, and the last sample."""
-        system = held(self.structure, self._sample_period)
-        half = 0.5 * system.b[:, np.newaxis]
-        a = np.block([[system.a, half], [np.zeros((1, len(half) + 1))]])
-        seen = self.share * system.c @ np.hstack((system.a, half))
-        direct = 0.5 * self.share * float(system.c @ system.b)
-        return SampledCoupling(a, np.append(half, 1.0), seen, direct, 0.0)
-
-    def at_rest(self) -> tuple[Array, Array]:
-        """State at rest at zero."""
-        return self._moved.at_rest(), np.zeros(1)
-
-    def apply(self, state: tuple[Array, Array], other: Array) -> tuple[tuple[Array, Array], Array]:
-        """What the other axis' displacement adds, both (n,) in m."""
-        structure, last = state
-        ends = np.concatenate((last, other))
-        after, moved = self._moved.apply(structure, 0.5 * (ends[1:] + ends[:-1]))
-        # Each sample is that at its period's end: one later than the structure gives it.
-        late = self._moved.apply(after, np.zeros(1))[1]
-        return (after, ends[-1:]), self.share * np.concatenate((moved, late))[1:]
+    if structure.delay:
+        raise InputError("cross_coupling: a structure between the axes cannot have a delay")
+    system = held(structure, sample_period)
+    half = 0.5 * system.b[:, np.newaxis]
+    a = np.block([[system.a, half], [np.zeros((1, len(half) + 1))]])
+    seen = share * system.c @ np.hstack((system.a, half))
+    direct = 0.5 * share * float(system.c @ system.b)
+    return SampledCoupling(a, np.append(half, 1.0), seen, direct, sample_period)
 
 
 def insert_static(chain: Chain, values: Array) -> Chain:
     """Add a share of the other axis."""
-    return chain.with_coupling(MemorylessCoupling(*values))
+    return chain.with_coupling(Element(memoryless, (*values, 0.0)))
 
 
 def insert_arc(chain: Chain, values: Array) -> Chain:
     """Let the other axis swing on an arc: curvature (1/m)."""
-    return chain.with_coupling(MemorylessCoupling(0.0, *values))
+    return chain.with_coupling(Element(memoryless, (0.0, *values)))
 
 
 def insert_dynamic(chain: Chain, values: Array) -> Chain:
@@ -137,15 +87,15 @@ def insert_coupled_mode(chain: Chain, values: Array) -> Chain:
     mode = resonant(2.0 * np.pi * frequency, damping)
     pull = share * first.omega**2 * np.array([*mode[:-1], 0.0])
     coupled = np.polyadd(np.polymul(first.factor, mode), pull)
-    loaded = with_vibration(
-        chain, np.polymul(base.numerator, mode), np.polymul(first.rest, coupled)
+    loaded = chain.with_vibration(
+        numerator=np.polymul(base.numerator, mode), denominator=np.polymul(first.rest, coupled)
     )
     structure = VibrationModel([first.omega**2 * mode[-1]], coupled)
     return _with_structure(loaded, share, structure)
 
 
 def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Chain:
-    return chain.with_coupling(Element(DynamicCoupling, (share, structure)))
+    return chain.with_coupling(Element(by_structure, (share, structure)))
 
 
 def starts_dynamic(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:

@@ -8,7 +8,6 @@ linear phase.
 from collections.abc import Iterator
 
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
@@ -20,8 +19,7 @@ DELAY = EffectParameter("delay", "s", 0.0, 5e-3, 1e-7)
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Delay the vibration by a time in s."""
-    vibration = evolve(chain.model.vibration, delay=chain.model.vibration.delay + values[0])
-    return evolve(chain, model=evolve(chain.model, vibration=vibration))
+    return chain.with_vibration(delay=chain.model.vibration.delay + values[0])
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -17,10 +17,7 @@ drive far below its frequency it is a gain. m, g and ζ are dimensionless, f is 
 Assumption: linear.
 
 Of a ringing drive the hysteresis takes the voltage v as held between updates. So it gets the mean
-of v over each hold, exactly. The pole is p = (j √(1 - ζ²) - ζ) 2π/P, and q is a delay by T. With
-z = e^{pT}, r = -(1 - j ζ/√(1 - ζ²)) and c = r (z - 1) / (pT):
-
-    v = u + (1 - q) (Re c - q Re(c z*)) / (1 - 2 q Re z + q² |z|²) u
+of v over each hold, as of lti.py, with the pole (j √(1 - ζ²) - ζ) 2π/P.
 """
 
 import math
@@ -32,21 +29,16 @@ import scipy
 from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.lti import HeldDrive
 from afm_scan_ros.core.effects.residual_features import (
     DAMPINGS,
     CandidateMode,
     ResidualFeatures,
     likely_modes,
 )
-from afm_scan_ros.core.effects.resonance import (
-    first_resonance,
-    multiplied,
-    resonant,
-    with_vibration,
-)
-from afm_scan_ros.core.effects.vibration import OSCILLATES
+from afm_scan_ros.core.effects.vibration import OSCILLATES, first_resonance, resonant
 from afm_scan_ros.core.types import Array
 
 FREQUENCY = EffectParameter("frequency", "Hz", 20.0, 3e3, 0.01, neutral=1000.0, excited=True)
@@ -63,56 +55,10 @@ MASSES = (0.05, 0.1, 0.2, 0.4)
 SEEN = 3
 
 
-def held_ring(period: float, damping: float, sample_period: float) -> tuple[Array, Array]:
-    """Numerator and denominator (3,) each in powers of q, from a hold to v's mean over it."""
-    if period == 0.0:
-        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    root = math.sqrt(1.0 - damping**2)
-    turn = complex(-damping, root) * 2.0 * np.pi * sample_period / period
-    z = np.exp(turn)
-    c = complex(-1.0, damping / root) * (z - 1.0) / turn
-    denominator = np.array([1.0, -2.0 * z.real, abs(z) ** 2])
-    away = np.convolve([1.0, -1.0], [c.real, -(c * z.conjugate()).real])
-    return denominator + away, denominator
-
-
-class RingingDrive(CausalInverse):
-    """Second-order lag that rings; the state is the filter's (2,).
-
-    From v to u the numerator's zeros are those of a spline, one of them outside the unit circle:
-    its inverse would grow. It is a smooth hump, of which the inverse undoes place and width by the
-    parabola through three samples: exact up to second order in ωT, and it never rings. The
-    inverse's state is the last four samples of v (V).
-    """
-
-    def __init__(self, period: float, damping: float, sample_period: float) -> None:
-        self._numerator, self._denominator = held_ring(period, damping, sample_period)
-        total = self._numerator.sum()
-        mean, square = (self._numerator @ np.arange(3.0) ** power / total for power in (1, 2))
-        last = mean**2 + 0.5 * (mean - square)
-        weights = np.array([1.0 + mean + last, -mean - 2.0 * last, last])
-        self._inverse = np.convolve(self._denominator / total, weights)
-
-    def at_rest(self) -> Array:
-        """State of a scanner that has long rested at zero."""
-        return np.zeros(2)
-
-    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
-        if not block.size:  # of which lfilter makes up a state
-            return state, block
-        found, state = scipy.signal.lfilter(self._numerator, self._denominator, block, zi=state)
-        return state, found
-
-    def inverse_at_rest(self) -> Array:
-        """Four samples before the first, at rest."""
-        return np.zeros(4)
-
-    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Voltages u to hold for mean voltages v, both (n,)."""
-        known = np.concatenate((state, block))
-        found = np.convolve(known, self._inverse)[4 : len(known)]
-        return known[-4:].copy(), found
+def ringing_drive(period: float, damping: float, sample_period: float) -> HeldDrive:
+    """Return a drive that rings with a period (s) at a sample period (s)."""
+    pole = complex(-damping, math.sqrt(1.0 - damping**2))
+    return HeldDrive(pole * 2.0 * np.pi / period if period else -np.inf, sample_period)
 
 
 def _mode(frequency: float, damping: float) -> Array:
@@ -124,7 +70,7 @@ def insert_series_mode(chain: Chain, values: Array) -> Chain:
     mass, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     riding = np.polyadd(mode, [mass, 0.0, 0.0])
-    return multiplied(chain, np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
+    return chain.multiplied(np.polymul(base.numerator, riding), np.polymul(base.denominator, mode))
 
 
 def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
@@ -133,8 +79,7 @@ def insert_absorber_mode(chain: Chain, values: Array) -> Chain:
     base, mode = chain.model.vibration, _mode(frequency, damping)
     pull = mass * np.polymul([1.0, 0.0, 0.0], mode[1:])
     loaded = np.polymul(first_resonance(base).rest, pull)
-    return multiplied(
-        chain,
+    return chain.multiplied(
         np.polymul(base.numerator, mode),
         np.polyadd(np.polymul(base.denominator, mode), loaded),
     )
@@ -145,16 +90,15 @@ def insert_parallel(chain: Chain, values: Array) -> Chain:
     share, frequency, damping = values
     base, mode = chain.model.vibration, _mode(frequency, damping)
     beside = share * base.static_gain * mode[-1] * np.array(base.denominator)
-    return with_vibration(
-        chain,
-        np.polyadd(np.polymul(base.numerator, mode), beside),
-        np.polymul(base.denominator, mode),
+    return chain.with_vibration(
+        numerator=np.polyadd(np.polymul(base.numerator, mode), beside),
+        denominator=np.polymul(base.denominator, mode),
     )
 
 
 def insert_drive(chain: Chain, values: Array) -> Chain:
     """Let the drive ring: period (s), damping."""
-    return chain.with_drive(Element(RingingDrive, tuple(values)))
+    return chain.with_drive(Element(ringing_drive, tuple(values)))
 
 
 def starts_series_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:

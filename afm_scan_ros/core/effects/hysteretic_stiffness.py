@@ -34,9 +34,8 @@ from afm_scan_ros.core.effects.effect_type import (
     register,
 )
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.effects.resonance import Resonance, first_resonance
 from afm_scan_ros.core.effects.scale import length_scale
-from afm_scan_ros.core.effects.vibration import VibrationModel, held
+from afm_scan_ros.core.effects.vibration import Resonance, VibrationModel, first_resonance, held
 from afm_scan_ros.core.types import Array
 
 SHARE = EffectParameter("share", "1", 0.0, 0.9, 1e-6)

@@ -3,84 +3,32 @@
 τ dv/dt + v = u before the hysteresis, with u and v in V and τ in seconds. Its cause is the output
 resistance of the amplifier and the piezo's capacitance, or a low-pass filter behind the converter.
 
-The hysteresis takes v as held between updates. So it gets the mean of v over each hold. This is
-exact for all that is slow beside the sample period. T is that period, e the voltage at a hold's
-end, and a = e^{-T/τ}:
-
-    v[k] = u[k] + m (e[k-1] - u[k]),    e[k] = u[k] + a (e[k-1] - u[k]),    m = (1 - a) τ / T
+The hysteresis takes v as held between updates. So it gets the mean of v over each hold, as of
+lti.py, with the pole -1/τ. This is exact for all that is slow beside the sample period.
 """
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
+from afm_scan_ros.core.effects.lti import HeldDrive, pole_of
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.types import Array
 
 LAG = EffectParameter("lag", "s", 0.0, 5e-2, 1e-7)
 
 
-def held_lag(lag: float, sample_period: float) -> tuple[float, float]:
-    """Shares m and a of an earlier value: in the mean over a hold, and at its end."""
-    if lag == 0.0:
-        return 0.0, 0.0
-    passed = -math.expm1(-sample_period / lag)
-    return passed * lag / sample_period, 1.0 - passed
-
-
-@compiled
-def _apply(end: float, mean_share: float, end_share: float, block: Array, result: Array) -> float:
-    for k in range(block.size):
-        behind = end - block[k]
-        result[k] = block[k] + mean_share * behind
-        end = block[k] + end_share * behind
-    return end
-
-
-class InputLag(CausalInverse):
-    """First-order lag; the state is the voltage at the last hold's end (V).
-
-    From v to u the equations above have a pole p = (a - m) / (1 - m), near -1 for τ well above
-    T: stable, but every kink of v would ring at half the sample rate for some τ / T periods. So
-    the inverse takes the pole's part, a delay by less than half a sample, as the straight line
-    through the last two samples. That is exact up to first order in ωT, and never rings. The
-    inverse's state is the last two samples of v (V).
-    """
-
-    def __init__(self, lag: float, sample_period: float) -> None:
-        self._shares = held_lag(lag, sample_period)
-        mean_share, end_share = self._shares
-        ahead = (mean_share - end_share) / (1.0 - end_share)  # -p / (1 - p)
-        self._inverse = np.convolve([1.0, -end_share], [1.0 + ahead, -ahead]) / (1.0 - end_share)
-
-    def at_rest(self) -> float:
-        """Voltage of a scanner that has long rested at zero."""
-        return 0.0
-
-    def apply(self, state: float, block: Array) -> tuple[float, Array]:
-        """Mean voltage v on the piezo during each hold, for voltages u held, both (n,)."""
-        result = np.empty_like(block)
-        return _apply(state, *self._shares, block, result), result
-
-    def inverse_at_rest(self) -> Array:
-        """Both samples before the first, at rest."""
-        return np.zeros(2)
-
-    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Voltages u to hold for mean voltages v, both (n,)."""
-        known = np.concatenate((state, block))
-        now, last, before = self._inverse
-        return known[-2:].copy(), now * known[2:] + last * known[1:-1] + before * known[:-2]
+def lagging_drive(lag: float, sample_period: float) -> HeldDrive:
+    """Return a lag of a time constant (s) at a sample period (s)."""
+    return HeldDrive(pole_of(lag), sample_period)
 
 
 def insert(chain: Chain, values: Array) -> Chain:
     """Let the drive lag by a time constant in s."""
-    return chain.with_drive(Element(InputLag, tuple(values)))
+    return chain.with_drive(Element(lagging_drive, tuple(values)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:

@@ -60,32 +60,6 @@ class Convolution:
         return result.ravel()[:count]
 
 
-class SideBySide:
-    """Filter several streams, each by its own of the kernels of shape (streams, taps).
-
-    The state is the run of samples still needed, shape (streams, n). Blocks that are short become
-    the rows of one transform, which takes less time than one for each.
-    """
-
-    def __init__(self, kernels: Array) -> None:
-        self.count, self.taps = kernels.shape
-        self._each = [Convolution(kernel) for kernel in kernels]
-        self._spectra: Callable[[int], Spectrum] = lru_cache(CACHED)(partial(fft.rfft, kernels))
-
-    def filter(self, state: Array, blocks: Sequence[Array]) -> tuple[Array, list[Array]]:
-        """Return the state after each stream's next block, of one length, and what is valid."""
-        begin, lost = state.shape[1], self.taps - 1
-        length = begin + len(blocks[0])
-        rows = np.zeros((len(blocks), _fast(max(length, 1))))
-        rows[:, :begin] = state
-        for row, block in zip(rows, blocks, strict=True):
-            row[begin:length] = block
-        after = rows[:, max(length - lost, 0) : length].copy()
-        if rows.shape[1] > SAMPLES:
-            return after, [e.valid(row[:length]) for e, row in zip(self._each, rows, strict=True)]
-        return after, list(_cyclic(rows, self._spectra(rows.shape[1]))[:, lost:length])
-
-
 def _cyclic(rows: Array, spectra: Spectrum) -> Array:
     """Cyclic convolution of each row, shape (rows, size), with the kernels of the spectra."""
     products = fft.rfft(rows)
@@ -273,7 +247,8 @@ class OptimalInverse:
 class OptimalInverses:
     """Streams of several axes, each with its own optimal inverse, that look equally far ahead.
 
-    The state is the run of each axis' targets still needed, shape (axes, n), oldest first.
+    The state is the run of each axis' targets still needed, shape (axes, n), oldest first. Blocks
+    that are short become the rows of one transform, which takes less time than one for each.
     """
 
     def __init__(self, inverses: Sequence[OptimalInverse]) -> None:
@@ -284,15 +259,26 @@ class OptimalInverses:
         for row, cut in zip(kernels, cuts, strict=True):
             first = self.preview - cut.centre
             row[first : first + len(cut.values)] = cut.values
-        self._streams = SideBySide(kernels)
+        self._before = np.zeros((len(cuts), behind - 1))
+        self._each = [Convolution(kernel) for kernel in kernels]
+        self._spectra: Callable[[int], Spectrum] = lru_cache(CACHED)(partial(fft.rfft, kernels))
 
     def at_rest(self) -> Array:
         """State before sample 0."""
-        return np.zeros((self._streams.count, self._streams.taps - 1 - self.preview))
+        return self._before
 
     def invert(self, state: Array, blocks: Sequence[Array]) -> tuple[Array, list[Array]]:
         """Inputs of each axis for the targets whose preview is complete with its block."""
-        return self._streams.filter(state, blocks)
+        begin, lost = state.shape[1], self._each[0].taps - 1
+        length = begin + len(blocks[0])
+        rows = np.zeros((len(blocks), _fast(max(length, 1))))
+        rows[:, :begin] = state
+        for row, block in zip(rows, blocks, strict=True):
+            row[begin:length] = block
+        after = rows[:, max(length - lost, 0) : length].copy()
+        if rows.shape[1] > SAMPLES:
+            return after, [e.valid(row[:length]) for e, row in zip(self._each, rows, strict=True)]
+        return after, list(_cyclic(rows, self._spectra(rows.shape[1]))[:, lost:length])
 
     def finish(self, state: Array) -> list[Array]:
         """Inputs still owed, each axis' last target being held."""

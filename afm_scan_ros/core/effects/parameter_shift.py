@@ -32,7 +32,7 @@ from afm_scan_ros.core.effects.effect_type import (
     fixed,
     register,
 )
-from afm_scan_ros.core.effects.resonance import first_resonance, resonant, with_vibration
+from afm_scan_ros.core.effects.vibration import first_resonance, resonant
 from afm_scan_ros.core.types import Array
 
 
@@ -59,8 +59,7 @@ HASTENED = (1.0, 0.3, 3.0)
 def insert_gain(chain: Chain, values: Array) -> Chain:
     """Multiply G by a factor."""
     (factor,) = values
-    base = chain.model.vibration
-    return with_vibration(chain, factor * np.array(base.numerator), base.denominator)
+    return chain.with_vibration(numerator=factor * np.array(chain.model.vibration.numerator))
 
 
 def insert_resonance(chain: Chain, values: Array) -> Chain:
@@ -71,22 +70,22 @@ def insert_resonance(chain: Chain, values: Array) -> Chain:
     change = np.polymul(found.rest, moved - found.factor)
     denominator = np.polyadd(base.denominator, change)
     numerator = np.array(base.numerator) * (denominator[-1] / base.denominator[-1])
-    return with_vibration(chain, numerator, denominator)
+    return chain.with_vibration(numerator=numerator, denominator=denominator)
 
 
 def insert_stiffness(chain: Chain, values: Array) -> Chain:
     """Multiply the stiffness of the first resonance by a factor, its mass and loss as they were."""
     (stiffness,) = values
-    base, found = chain.model.vibration, first_resonance(chain.model.vibration)
+    found = first_resonance(chain.model.vibration)
     moved = resonant(stiffness**0.5 * found.omega, stiffness**-0.5 * found.damping)
-    return with_vibration(chain, base.numerator, np.polymul(found.rest, moved))
+    return chain.with_vibration(denominator=np.polymul(found.rest, moved))
 
 
 def insert_creep(chain: Chain, values: Array) -> Chain:
     """Multiply creep's gains and its time constants by a factor each."""
     base = chain.model.creep
     creep = CreepModel(values[0] * np.array(base.gains), values[1] * np.array(base.time_constants))
-    return evolve(chain, model=evolve(chain.model, creep=creep))
+    return chain.with_model(creep=creep)
 
 
 def insert_warmth(chain: Chain, values: Array) -> Chain:
@@ -102,8 +101,7 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     (factor,) = values
     base = chain.model.hysteresis
     forward, direct = base.forward.with_share(factor), base.direct.with_share(factor)
-    hysteresis = evolve(base, forward=forward, direct=direct)
-    return evolve(chain, model=evolve(chain.model, hysteresis=hysteresis))
+    return chain.with_model(hysteresis=evolve(base, forward=forward, direct=direct))
 
 
 @register

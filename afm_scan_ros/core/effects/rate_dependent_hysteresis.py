@@ -9,8 +9,8 @@ R is the reversible part of the model's hysteresis and H the rest; u, w and F ar
 - activated: τ dp/dt = ± a (e^{|e|/a} - 1), with a in V, and e what lies beyond the threshold. Heat
   helps over the barriers, so at a steady rate v a block lags by a ln(1 + v τ / a).
 
-Cause: the viscosity of hysteresis. What follows gets the mean over each hold, so w is that of
-input_lag. The film is in viscous_plays.py.
+Cause: the viscosity of hysteresis. What follows gets the mean over each hold, so w is the drive
+behind an input_lag. The film is in viscous_plays.py.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ from afm_scan_ros.core.effects.hysteresis.walk import (
     looked_up,
     try_input,
 )
-from afm_scan_ros.core.effects.input_lag import InputLag, held_lag
+from afm_scan_ros.core.effects.lti import mean_over_holds, pole_of
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.viscous_plays import (
     EXACT,
@@ -45,7 +45,7 @@ from afm_scan_ros.core.types import Array
 
 LAG = EffectParameter("lag", "s", 0.0, 1.0, 1e-7)
 ACTIVATION = EffectParameter("activation", "V", 1e-4, 4.0, 1e-6, neutral=1e-2)
-State = tuple[Memory, float]
+State = tuple[Memory, Array]
 
 
 @inlined
@@ -114,8 +114,7 @@ class RateDependentHysteresis(CausalInverse):
     """
 
     def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
-        self._shares = held_lag(lag, sample_period)
-        self._lag = InputLag(lag, sample_period)
+        self._lag = mean_over_holds(pole_of(lag), sample_period)
         self._preisach = Preisach(surface)
         self._levels = reversible(surface)
         self._surface = looked_up(surface.values, surface.levels), self._levels
@@ -139,12 +138,12 @@ class RateDependentHysteresis(CausalInverse):
         depth, end, found = _invert(
             self._surface,
             (stack, memory.extrema.shape[1], now),
-            (*self._shares, state[1]),
+            (float(self._lag.c[0]), float(self._lag.a[0, 0]), float(state[1][0])),
             block,
             result,
         )
         refuse_unsolved(found, block, result)
-        return (Memory((stack[:, :depth].copy(),), now), end), result
+        return (Memory((stack[:, :depth].copy(),), now), np.array([end])), result
 
     def _straight(self, inputs: Array) -> Array:
         return np.interp(inputs, self._preisach.surface.levels, self._levels)

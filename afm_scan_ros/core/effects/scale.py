@@ -10,8 +10,7 @@ from math import prod
 
 from attrs import frozen
 
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel
 

@@ -20,7 +20,7 @@ from attrs import field, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import StatelessEffect
+from afm_scan_ros.core.effects.base import LEVELS, StatelessEffect, solved
 from afm_scan_ros.core.effects.effect_type import (
     Actuators,
     EffectForm,
@@ -36,9 +36,6 @@ from afm_scan_ros.core.types import Array, floats
 
 REACH, REACH_V = 40e-6, 5.0
 """m and V: 1.8 times the displacement and 1.25 times the drive of the reference scanner."""
-LEVELS = 2049
-NEWTON_STEPS = 3
-"""The table starts within 1 nm at worst; each step squares the error, two reach rounding."""
 EXACT = 1e-9
 """Share of the reach by which the inverse may miss a target: below any noise."""
 
@@ -102,10 +99,7 @@ class StaticNonlinearity(StatelessEffect):
 
         Raises SampleError where Newton's method has not converged, as for a target that is NaN.
         """
-        found = np.interp(outputs, self._bent, self._straight)
-        for _ in range(NEWTON_STEPS):
-            bent, slope = self._bend(found)
-            found = found - (bent - outputs) / slope
+        found = solved(self._bend, self._straight, self._bent, outputs)
         missed = ~(np.abs(self._bend(found)[0] - outputs) <= EXACT * self.reach)
         if missed.any():
             sample = int(np.argmax(missed))

@@ -14,7 +14,7 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
-from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.lti import SampledSystem
 from afm_scan_ros.core.effects.optimal_inverse import (
     Kernel,
     MultipliedWeight,
@@ -96,45 +96,44 @@ class VibrationModel:
         return float(slowest / (2.0 * np.pi))
 
 
+def resonant(omega: float, damping: float) -> Array:
+    """Return s² + 2 damping omega s + omega², omega in rad/s."""
+    return np.array([1.0, 2.0 * damping * omega, omega**2])
+
+
+@frozen
+class Resonance:
+    """G's denominator is ``rest`` times s² + 2 ``damping`` ``omega`` s + ``omega``² (rad/s)."""
+
+    omega: float
+    damping: float
+    rest: tuple[float, ...] = field(converter=floats)
+
+    @property
+    def frequency(self) -> float:
+        """Frequency without damping, Hz."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
+    def factor(self) -> Array:
+        """Its polynomial in descending powers of s, shape (3,)."""
+        return resonant(self.omega, self.damping)
+
+
+def first_resonance(vibration: VibrationModel) -> Resonance:
+    """Return the resonance that rises highest; raises InputError where there is none."""
+    if (pole := vibration.resonant_pole) is None:
+        raise InputError("the vibration model has no resonance: leave out effects that act on one")
+    omega, damping = abs(pole), -pole.real / abs(pole)
+    rest = np.polydiv(vibration.denominator, resonant(omega, damping))[0]
+    return Resonance(omega, damping, rest)
+
+
 LARGEST_TAIL = 1e-4
 """Share of the inverse's response that may lie ahead of the preview."""
 PERIODS = 9.0
 """Of the first resonance, that a preview lasts at least: nothing of the response of a well damped
 scanner lies ahead of it, 1e-11 on the default plant."""
-
-
-@frozen
-class InverseDesign:
-    """How to invert: weight, and preview (s), which is as long as the inverse needs where None.
-
-    ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
-    """
-
-    weight: Weight | RelativeWeight = field(factory=RelativeWeight)
-    preview: float | None = None
-    before: VibrationModel | None = None
-
-
-@frozen(eq=False)
-class SampledSystem:
-    """x[k+1] = a x[k] + b u[k - delay], y[k] = c x[k], with shapes (n, n), (n,), (n,)."""
-
-    a: Array
-    b: Array
-    c: Array
-    sample_period: float
-    delay: int
-    """Whole samples by which the input comes late."""
-
-    def response(self, omega: Array) -> NDArray[np.complex128]:
-        """Y/U at angular frequencies ``omega`` in rad/s, same shape."""
-        z = np.exp(1j * omega * self.sample_period)
-        resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.b)) - self.a
-        forcing = np.broadcast_to(self.b[:, np.newaxis], (len(z), len(self.b), 1))
-        states = np.linalg.solve(resolvent, forcing)
-        result: NDArray[np.complex128] = (self.c.astype(complex) @ states)[:, 0]
-        late: NDArray[np.complex128] = z**-self.delay
-        return result * late
 
 
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
@@ -146,11 +145,12 @@ def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     whole, part = divmod(model.delay / sample_period, 1.0)
     a, late, c = _discrete(model, sample_period)
     if part == 0.0:
-        return SampledSystem(a, late, c, sample_period, int(whole))
+        return SampledSystem(a, late, c, 0.0, sample_period, int(whole))
     # Within a period the input before still acts for its first part, and is one more state.
     b = _discrete(model, (1.0 - part) * sample_period)[1]
     a = np.block([[a, (late - b)[:, np.newaxis]], [np.zeros((1, len(b) + 1))]])
-    return SampledSystem(a, np.append(b, 1.0), np.append(c, 0.0), sample_period, int(whole))
+    b, c = np.append(b, 1.0), np.append(c, 0.0)
+    return SampledSystem(a, b, c, 0.0, sample_period, int(whole))
 
 
 def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array]:
@@ -168,51 +168,42 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
     return discrete[:degree, :degree], discrete[:degree, degree], read_out[0] / denominator[0]
 
 
-@compiled
-def _apply(a: Array, b: Array, c: Array, state: Array, block: Array, result: Array) -> None:
-    n = state.size
-    step = np.empty(n)
-    for k in range(block.size):
-        y = 0.0
-        for i in range(n):
-            y += c[i] * state[i]
-            new = b[i] * block[k]
-            for j in range(n):
-                new += a[i, j] * state[j]
-            step[i] = new
-        state[:] = step
-        result[k] = y
-
-
 class Vibration:
     """Vibration of one axis; the state is that of the sampled system, then the inputs delayed.
 
     The inverse is the optimal one, designed when first asked for; what it declares is the
-    modified trajectory of the paper's Eq. 22, exact at rest.
+    modified trajectory of the paper's Eq. 22, exact at rest. Its ``preview`` (s) is as long as it
+    needs where None. ``before`` is the vibration that the weight was chosen for, where another one
+    multiplies it.
     """
 
     def __init__(
-        self, model: VibrationModel, sample_period: float, design: InverseDesign | None = None
+        self,
+        model: VibrationModel,
+        sample_period: float,
+        weight: Weight | RelativeWeight | None = None,
+        preview: float | None = None,
+        before: VibrationModel | None = None,
     ) -> None:
         self._system = held(model, sample_period)
         self._model, self._sample_period = model, sample_period
-        self._design = design or InverseDesign()
+        self._chosen, self._given, self._before = weight or RelativeWeight(), preview, before
 
     @cached_property
     def inverse(self) -> OptimalInverse:
-        """The optimal inverse by the design.
+        """The optimal inverse by its weight.
 
-        Raises InputError where its response does not die out, or where the design's preview cuts
-        off what the inverse needs of the targets ahead.
+        Raises InputError where its response does not die out, or where the preview given cuts off
+        what the inverse needs of the targets ahead.
         """
         kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
-        return OptimalInverse(kernel, self._preview(kernel, self._design.preview))
+        return OptimalInverse(kernel, self._preview(kernel, self._given))
 
     def _weight(self) -> Weight:
-        weight, chosen_for = self._design.weight, self._design.before or self._model
+        weight, chosen_for = self._chosen, self._before or self._model
         if isinstance(weight, RelativeWeight):
             weight = weight.at(chosen_for.natural_frequency)
-        if self._design.before is None:
+        if self._before is None:
             return weight
         response, before = self._system.response, held(chosen_for, self._sample_period).response
         return MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
@@ -235,15 +226,11 @@ class Vibration:
 
     def at_rest(self) -> Array:
         """State at rest at zero, shape (n + delay,)."""
-        return np.zeros(len(self._system.b) + self._system.delay)
+        return self._system.at_rest()
 
     def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
         """Displacement (m) under a block of held inputs (V), both (n,)."""
-        order, system = len(self._system.b), self._system
-        inner, result = state[:order].copy(), np.empty_like(block)
-        inputs = np.concatenate((state[order:], block))
-        _apply(system.a, system.b, system.c, inner, inputs[: len(block)], result)
-        return np.concatenate((inner, inputs[len(block) :])), result
+        return self._system.apply(state, block)
 
     def inverse_at_rest(self) -> Array:
         """State of the inverse before sample 0: every earlier target was zero."""

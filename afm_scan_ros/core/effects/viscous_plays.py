@@ -28,7 +28,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import (
 )
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, OUTPUT, Surface, looked_up, try_input
-from afm_scan_ros.core.effects.input_lag import held_lag
+from afm_scan_ros.core.effects.lti import mean_over_holds, pole_of
 from afm_scan_ros.core.errors import SampleError
 from afm_scan_ros.core.types import Array
 
@@ -286,7 +286,8 @@ class ViscousPlays(CausalInverse):
         self._plays = curves(surface)
         step = (surface.upper - surface.lower) / (len(surface.values) - 1)
         self._grid = surface.lower, step
-        self._law = (*held_lag(lag, sample_period), activation / self._grid[1])
+        held = mean_over_holds(pole_of(lag), sample_period)
+        self._law = float(held.c[0]), float(held.a[0, 0]), activation / self._grid[1]
 
     def at_rest(self) -> State:
         """State of a scanner that was depolarised and has long rested at zero."""

@@ -10,8 +10,7 @@ from scipy.optimize import least_squares
 
 from afm_scan_ros.core.correction import window
 from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import phases

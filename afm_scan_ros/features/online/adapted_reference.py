@@ -26,8 +26,8 @@ from attrs import astuple, evolve, frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.parameter_shift import GAIN, RESONANCE
-from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.slow_creep import GAIN as CREEP_GAIN
+from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import Added, AxisModel
 from afm_scan_ros.core.scanner import chain_of

@@ -37,7 +37,7 @@ from afm_scan_ros.core.effects.parameter_shift import (
     insert_gain,
     insert_resonance,
 )
-from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 

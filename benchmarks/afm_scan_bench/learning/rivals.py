@@ -17,7 +17,7 @@ from afm_scan_bench.learning.repeated import RepeatingScanner
 from afm_scan_bench.scans import default_model
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.effects.resonance import first_resonance
+from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec

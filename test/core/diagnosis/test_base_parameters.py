@@ -29,8 +29,7 @@ from afm_scan_ros.core.diagnosis.likelihood import (
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.model import AxisModel, BaseEffects, EffectStatus, ParameterInterval
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import DEPOLARISED, InitialState, Playback
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.model import InverseSettings
 from afm_scan_ros.core.record import Record

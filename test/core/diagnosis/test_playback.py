@@ -4,9 +4,9 @@ import numpy as np
 import paper
 import pytest
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.types import Array
 

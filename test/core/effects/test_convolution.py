@@ -4,7 +4,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects.optimal_inverse import SAMPLES, Convolution, SideBySide
+from afm_scan_ros.core.effects.optimal_inverse import (
+    SAMPLES,
+    Convolution,
+    Kernel,
+    OptimalInverse,
+    OptimalInverses,
+)
 
 
 def same(found: np.ndarray, expected: np.ndarray) -> None:
@@ -42,9 +48,10 @@ def test_parallel_streams_are_independent(
     rng = np.random.default_rng(seed)
     kernels = rng.standard_normal((count, taps))
     streams = rng.standard_normal((count, sum(sizes) + taps))
-    side_by_side, state, parts = SideBySide(kernels), np.empty((count, 0)), []
+    inverses = OptimalInverses([OptimalInverse(Kernel(kernel, 0), 0) for kernel in kernels])
+    state, parts = inverses.at_rest()[:, :0], []
     for block in np.split(streams, np.cumsum(sizes), axis=1):
-        state, part = side_by_side.filter(state, list(block))
+        state, part = inverses.invert(state, list(block))
         parts.append(part)
     for kernel, stream, found in zip(kernels, streams, np.hstack(parts), strict=True):
         same(found, Convolution(kernel).valid(stream))

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from afm_scan_ros.core.effects.extra_resonance import RingingDrive, starts_drive
-from afm_scan_ros.core.effects.input_lag import InputLag
+from afm_scan_ros.core.effects.extra_resonance import ringing_drive, starts_drive
+from afm_scan_ros.core.effects.input_lag import lagging_drive
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.slew_limit import SlewLimit, TooSteepError
 
@@ -27,7 +27,7 @@ def test_a_lag_gives_the_mean_over_each_hold(lag: float, drive: list[float]) -> 
     for u in drive:
         means.append(np.mean(u + (end - u) * np.exp(-time / lag)))
         end = u + (end - u) * np.exp(-PERIOD / lag)
-    effect = InputLag(lag, PERIOD)
+    effect = lagging_drive(lag, PERIOD)
     found = effect.apply(effect.at_rest(), np.array(drive))[1]
     assert found == pytest.approx(means, abs=1e-4 * np.abs(drive).max() + 1e-12)
 
@@ -39,7 +39,7 @@ def test_a_lag_delays_and_attenuates_as_its_transfer_function(lag: float, freque
     omega = 2.0 * np.pi * frequency
     settling = 2 + int(20.0 * lag / PERIOD)
     time = PERIOD * np.arange(settling + round(5.0 / (frequency * PERIOD)))
-    effect = InputLag(lag, PERIOD)
+    effect = lagging_drive(lag, PERIOD)
     found = effect.apply(effect.at_rest(), np.sin(omega * time))[1][settling:]
     expected = (np.exp(1j * omega * time) / (1.0 + 1j * omega * lag)).imag[settling:]
     assert np.abs(found - expected).max() <= 0.2 * (omega * PERIOD) ** 2 + 1e-8
@@ -52,7 +52,7 @@ def test_the_inverse_of_a_lag_never_rings(lag: float, seed: int) -> None:
     slopes = np.random.default_rng(seed).uniform(-100.0, 100.0, 2)
     time = PERIOD * np.arange(-50, 50)
     target = np.where(time < 0.0, slopes[0], slopes[1]) * time - slopes[0] * time[0]
-    effect = InputLag(lag, PERIOD)
+    effect = lagging_drive(lag, PERIOD)
     found = effect.invert(effect.inverse_at_rest(), target)[1]
     expected = target + lag * np.where(time < 0.0, slopes[0], slopes[1])
     straight = np.r_[3:50, 53:100]
@@ -64,7 +64,7 @@ def test_the_inverse_of_a_lag_never_rings(lag: float, seed: int) -> None:
 @given(lag=st.floats(1e-6, 1e-3), seed=st.integers(0, 1000))
 def test_the_inverse_of_a_lag_is_exact_up_to_the_samples_spacing(lag: float, seed: int) -> None:
     target = paper.smooth_target(seed, 1000, 4.0)
-    effect = InputLag(lag, PERIOD)
+    effect = lagging_drive(lag, PERIOD)
     drive = effect.invert(effect.inverse_at_rest(), target)[1]
     found = effect.apply(effect.at_rest(), drive)[1]
     assert np.abs(found - target).max() <= 0.5 * np.abs(np.diff(target, 2)).max() + 1e-12
@@ -90,7 +90,7 @@ def test_a_ringing_gives_the_mean_over_each_hold(
             state = np.array([u, 0.0]) + swing @ (state - [u, 0.0])
             inside.append(0.5 * (before + state[0]))
         means.append(np.mean(inside))
-    effect = RingingDrive(ringing, damping, PERIOD)
+    effect = ringing_drive(ringing, damping, PERIOD)
     found = effect.apply(effect.at_rest(), np.array(drive))[1]
     assert found == pytest.approx(means, abs=2e-4 * np.abs(drive).max() + 1e-12)
 
@@ -102,7 +102,7 @@ def test_the_inverse_of_a_ringing_never_rings(ringing: float, damping: float, se
     slopes = np.random.default_rng(seed).uniform(-100.0, 100.0, 2)
     time = PERIOD * np.arange(-50, 50)
     target = np.where(time < 0.0, slopes[0], slopes[1]) * time - slopes[0] * time[0]
-    effect = RingingDrive(ringing, damping, PERIOD)
+    effect = ringing_drive(ringing, damping, PERIOD)
     found = effect.invert(effect.inverse_at_rest(), target)[1]
     lag = damping * ringing / np.pi
     expected = target + lag * np.where(time < 0.0, slopes[0], slopes[1])
@@ -117,7 +117,7 @@ def test_the_inverse_of_a_ringing_is_exact_up_to_the_samples_spacing(
 ) -> None:
     """What it gives is the target but for its third differences, wherever it begins and however."""
     target = paper.smooth_target(seed, 1000, 4.0)
-    effect = RingingDrive(ringing, damping, PERIOD)
+    effect = ringing_drive(ringing, damping, PERIOD)
     drive = effect.invert(effect.inverse_at_rest(), target)[1]
     found = effect.apply(effect.at_rest(), drive)[1]
     began = np.concatenate((np.zeros(3), target))
@@ -132,7 +132,7 @@ def test_a_ringing_is_begun_near_its_period_from_a_few_lines(
     """A motion that repeats a hundred times a second, of a few harmonics as high as each other."""
     time = PERIOD * np.arange(10_000)
     still = sum(np.cos(2.0 * np.pi * 100.0 * k * time + k * k) for k in range(1, 2 * size, 2))
-    effect = RingingDrive(ringing, damping, PERIOD)
+    effect = ringing_drive(ringing, damping, PERIOD)
     moved = effect.apply(effect.at_rest(), still)[1]
     features = ResidualFeatures(PERIOD, still, moved, moved - still, still, ())
     begun = [period for period, _ in starts_drive(features)]
@@ -201,3 +201,9 @@ def test_what_is_too_steep_is_refused_by_sample_slope_and_limit() -> None:
     assert caught.value.value == pytest.approx(1500.0)
     with pytest.raises(TooSteepError):
         effect.invert(state, np.array([np.nan]))
+
+
+def test_a_slow_ringing_settles_where_it_is_driven_at_a_high_rate() -> None:
+    effect = ringing_drive(0.05, 0.5, 1e-6)
+    found = effect.apply(effect.at_rest(), np.ones(1_000_000))[1]
+    assert found[-1] == pytest.approx(1.0, abs=1e-11)

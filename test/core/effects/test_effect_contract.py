@@ -11,8 +11,7 @@ from attrs import frozen
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.cascade import Cascade
-from afm_scan_ros.core.effects.base import Gain
+from afm_scan_ros.core.effects.base import Cascade, Gain
 from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach

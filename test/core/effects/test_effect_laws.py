@@ -11,8 +11,8 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.effect_type import PLACES
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.errors import InputError, ScanError

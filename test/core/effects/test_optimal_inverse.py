@@ -13,7 +13,7 @@ from afm_scan_ros.core.effects.optimal_inverse import (
     SmoothWeight,
     optimal_kernel,
 )
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration
+from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -51,7 +51,7 @@ def error(effect: Vibration, targets: np.ndarray) -> float:
 def test_the_inverse_tends_to_the_exact_one_as_its_cost_vanishes() -> None:
     targets = raster(20e3)
     errors = [
-        error(Vibration(MODEL, 5e-5, InverseDesign(SmoothWeight(corner, 2))), targets)
+        error(Vibration(MODEL, 5e-5, SmoothWeight(corner, 2)), targets)
         for corner in (3e3, 1e4, 3e4, 1e5, 1e7)
     ]
     assert all(b < 0.5 * a for a, b in pairwise(errors))
@@ -126,6 +126,6 @@ def test_a_weight_with_a_step_is_refused_with_its_tail() -> None:
         def ratio(self, omega: Array, sample_period: float) -> Array:  # noqa: ARG002 - Weight's
             return np.where(omega <= 2.0 * np.pi * 2000.0, 0.0, np.inf)
 
-    effect = Vibration(MODEL, 5e-5, InverseDesign(BrickWall()))
+    effect = Vibration(MODEL, 5e-5, BrickWall())
     with pytest.raises(InputError, match=r"0\.0\d+ of it still lies more than \d"):
         effect.inverse_at_rest()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.effects import static_nonlinearity
+from afm_scan_ros.core.effects import base
 from afm_scan_ros.core.effects.backlash import STEEPNESS, Backlash
 from afm_scan_ros.core.effects.drift import Drift, settles, slows
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance, starts_of_comb
@@ -94,7 +94,7 @@ def test_an_inverse_that_was_not_reached_is_refused(monkeypatch: pytest.MonkeyPa
     effect = StaticNonlinearity(np.array([0.0, 1.0, 1e4]))
     with pytest.raises(ScanError, match=r"^sample 1 of the block: static_nonlinearity"):
         effect.invert(None, np.array([0.0, np.nan]))
-    monkeypatch.setattr(static_nonlinearity, "NEWTON_STEPS", 0)
+    monkeypatch.setattr(base, "NEWTON_STEPS", 0)
     with pytest.raises(ScanError, match=r"^sample 1 of the block: static_nonlinearity"):
         effect.invert(None, np.array([0.0, 1.001e-5]))
 

@@ -1,5 +1,7 @@
 """An effect of another scanner is that of the reference scanner, in other units."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import paper
 import pytest
@@ -14,7 +16,7 @@ from afm_scan_ros.core.effects.scale import REFERENCE_LENGTH, REFERENCE_VOLTAGE,
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
 from afm_scan_ros.core.scanner import predict
-from afm_scan_ros.core.types import Trace
+from afm_scan_ros.core.types import Array, Trace
 from helpers.scaling import scaled_axis, scaled_trace
 
 PERIOD = 5e-5
@@ -57,27 +59,88 @@ def test_the_papers_scanner_has_the_resonance_of_the_reference() -> None:
     assert own.length * REFERENCE_LENGTH == pytest.approx(gain * upper)
 
 
+def added(name: str, kind: str, scale: Scale) -> Added:
+    """Effect of a size that a scanner may show, on a scanner of a scale."""
+    form = effect_type(name).form(kind)
+    pairs = zip(form.parameters, form.example, strict=True)
+    return Added(name, kind, tuple(scale.factor(p.unit) * value for p, value in pairs))
+
+
+def played(effects: Sequence[tuple[str, str]], scale: Scale) -> tuple[Array, Array]:
+    """Motion (2, n) of a scanner of a scale under a drive, and its drive for a target.
+
+    The axes have the effects, x also what couples it to y.
+    """
+    axis = scaled_axis(AXIS, scale)
+    of_both = [each for each in effects if each[0] != "cross_coupling"]
+    model = ScannerModel(
+        *(evolve(axis, added=[added(*e, scale) for e in each]) for each in (effects, of_both))
+    )
+    drive, target = (
+        Trace(0, PERIOD, *(paper.smooth_target(seed, 1500, size) for seed in (1, 2)))
+        for size in (3.0, 3e-6)
+    )
+    moved = predict(model, scaled_trace(drive, scale.voltage, scale.time))
+    limits, settings = DriveLimits(np.inf, np.inf), InverseSettings()
+    wanted = scaled_trace(target, scale.length, scale.time)
+    inverse = Compensation(model, wanted.sample_period, INVERSES, settings, limits)
+    driven = inverse.whole(wanted)
+    return np.stack((moved.x, moved.y)), np.stack((driven.x, driven.y))
+
+
+def same_but_for_scale(effects: Sequence[tuple[str, str]], scale: Scale) -> None:
+    sizes = scale.length, scale.voltage
+    for found, base, size in zip(
+        played(effects, scale), played(effects, Scale()), sizes, strict=True
+    ):
+        assert np.abs(found / size - base).max() <= 1e-9 * np.ptp(base)
+
+
 @every_form
 @settings(deadline=None, max_examples=3)
+@example(scale=Scale(time=0.01))  # a fast scanner, of which a corner in Hz would lose the most
 @given(scale=scales)
-def test_the_motion_of_a_scaled_scanner_is_the_scaled_motion(
+def test_a_scaled_scanner_moves_and_is_driven_as_the_other(
     name: str, kind: str, scale: Scale
 ) -> None:
-    form = effect_type(name).form(kind)
-    values = [scale.factor(p.unit) * v for p, v in zip(form.parameters, form.example, strict=True)]
-    x, y = (paper.smooth_target(seed, 600, 3.0) for seed in (1, 2))
-    drive = Trace(0, PERIOD, x, y)
-    other = scaled_axis(AXIS, scale)
-    base, found = (
-        predict(ScannerModel(evolve(axis, added=(Added(name, kind, at),)), axis), driven)
-        for axis, at, driven in (
-            (AXIS, form.example, drive),
-            (other, tuple(values), scaled_trace(drive, scale.voltage, scale.time)),
-        )
-    )
-    np.testing.assert_allclose(
-        found.x, scale.length * base.x, rtol=0.0, atol=1e-6 * scale.length * np.ptp(base.x)
-    )
+    """So the inverse errs alike on a fast and on a slow scanner: no number in Hz or s decides."""
+    same_but_for_scale([(name, kind)], scale)
+
+
+CHAINS = (
+    [
+        ("slew_limit", "resistive"),
+        ("input_lag", ""),
+        ("static_nonlinearity", "drive"),
+        ("rate_dependent_hysteresis", "activated"),
+        ("delay", ""),
+        ("extra_resonance", "absorber_mode"),
+        ("cross_coupling", "modal"),
+        ("slow_creep", "power"),
+        ("drift", "logarithmic"),
+    ],
+    [
+        ("extra_resonance", "drive"),
+        ("rate_dependent_hysteresis", ""),
+        ("parameter_shift", "warmth"),
+        ("cross_coupling", "coupled_mode"),
+        ("hysteretic_stiffness", "spectrum"),
+        ("static_nonlinearity", "quintic"),
+        ("backlash", ""),
+        ("periodic_disturbance", "hum"),
+    ],
+)
+
+
+@pytest.mark.parametrize("effects", CHAINS, ids=["first", "second"])
+@settings(deadline=None, max_examples=4)
+@example(scale=Scale(0.01, 0.01, 0.01))
+@example(scale=Scale(100.0, 100.0, 100.0))
+@given(scale=scales)
+def test_so_does_a_scanner_with_effects_in_all_places(
+    effects: list[tuple[str, str]], scale: Scale
+) -> None:
+    same_but_for_scale(effects, scale)
 
 
 @every_form
@@ -100,34 +163,3 @@ def test_a_fit_of_a_scaled_scanner_starts_at_scaled_values(
     sizes = [scale.factor(parameter.unit) for parameter in form.parameters]
     expected = [np.array(sizes) * start for start in form.starts(features)]
     np.testing.assert_allclose([*form.at(scale).starts(other)], expected, rtol=1e-4)
-
-
-@every_form
-@settings(deadline=None, max_examples=3)
-@example(scale=Scale(time=0.01))  # a fast scanner, of which a corner in Hz would lose the most
-@given(scale=scales)
-def test_the_drive_of_a_scaled_scanner_is_the_scaled_drive(
-    name: str, kind: str, scale: Scale
-) -> None:
-    """So the inverse errs alike on a fast and on a slow scanner: no number in Hz or s decides."""
-    form = effect_type(name).form(kind)
-    values = [scale.factor(p.unit) * v for p, v in zip(form.parameters, form.example, strict=True)]
-    target = Trace(0, PERIOD, *(paper.smooth_target(seed, 2000, 3e-6) for seed in (1, 2)))
-    scaled = scaled_trace(target, scale.length, scale.time)
-    other = scaled_axis(AXIS, scale)
-    base, found = (
-        Compensation(
-            ScannerModel(evolve(axis, added=(Added(name, kind, at),)), axis),
-            wanted.sample_period,
-            INVERSES,
-            InverseSettings(),
-            DriveLimits(np.inf, np.inf),
-        ).whole(wanted)
-        for axis, at, wanted in (
-            (AXIS, form.example, target),
-            (other, tuple(values), scaled),
-        )
-    )
-    np.testing.assert_allclose(
-        found.x, scale.voltage * base.x, rtol=0.0, atol=1e-6 * scale.voltage * np.ptp(base.x)
-    )

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from afm_scan_ros.core.cascade import Cascade
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.hysteretic_stiffness import (
     ELEMENTS,
     KNOTS,
@@ -20,8 +20,12 @@ from afm_scan_ros.core.effects.hysteretic_stiffness import (
     spectrum,
 )
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.resonance import first_resonance
-from afm_scan_ros.core.effects.vibration import LARGEST_TAIL, Vibration, VibrationModel
+from afm_scan_ros.core.effects.vibration import (
+    LARGEST_TAIL,
+    Vibration,
+    VibrationModel,
+    first_resonance,
+)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import InverseSettings
 
@@ -119,10 +123,10 @@ def test_a_coupled_mode_loads_and_couples_as_a_mass_between_two_axes(
     equations = np.array([[own + share, -2.0 * share + 0.0 * s], [-0.5 + 0.0 * s, mode]])
     form = effect_type("cross_coupling").form("coupled_mode")
     chain = form.insert(CHAIN, np.array([share, frequency, damping]))
-    element = chain.coupling[0].at(PERIOD)
+    crossing, structure = chain.coupling[0].parameters
     for piezo, other, found in (
         (own, 0.0 * s, chain.model.vibration.response(OMEGA) / BASE.response(OMEGA)),
-        (0.0 * s, 0.5 + 0.0 * s, element.share * element.structure.response(OMEGA)),
+        (0.0 * s, 0.5 + 0.0 * s, crossing * structure.response(OMEGA)),
     ):
         forced = np.stack((piezo, other)).T[:, :, np.newaxis]
         moved = np.linalg.solve(equations.transpose(2, 0, 1), forced)[:, 0, 0]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.effects.vibration import InverseDesign, Vibration, VibrationModel, held
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel, held
 from afm_scan_ros.core.errors import InputError
 
 MODEL = paper.vibration()
@@ -99,7 +99,7 @@ def test_a_delay_turns_the_phase_alone(delay: float) -> None:
 @settings(deadline=None, max_examples=6)
 @given(delay=st.floats(0.0, 3e-3), seed=st.integers(0, 1000))
 def test_the_inverse_looks_ahead_by_the_delay(delay: float, seed: int) -> None:
-    effect = Vibration(evolve(MODEL, delay=delay), 5e-5, InverseDesign(preview=12e-3))
+    effect = Vibration(evolve(MODEL, delay=delay), 5e-5, preview=12e-3)
     target = paper.smooth_target(seed, 2000, 1e-5)
     state, first = effect.invert(effect.inverse_at_rest(), target)
     inputs = np.concatenate((first, effect.finish(state)))
@@ -108,7 +108,7 @@ def test_the_inverse_looks_ahead_by_the_delay(delay: float, seed: int) -> None:
 
 
 def test_a_preview_shorter_than_the_delay_is_refused_with_the_one_it_takes() -> None:
-    effect = Vibration(evolve(MODEL, delay=5e-3), 5e-5, InverseDesign(preview=4e-3))
+    effect = Vibration(evolve(MODEL, delay=5e-3), 5e-5, preview=4e-3)
     with pytest.raises(InputError, match=r"a preview of 80 samples, 4 ms, .* give at least"):
         effect.inverse_at_rest()
 

@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach

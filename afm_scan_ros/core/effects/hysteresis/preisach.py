@@ -14,15 +14,11 @@ congruent.
 import numpy as np
 from attrs import field, frozen
 
-from afm_scan_ros.core.effects.base import CausalInverse, StatelessEffect
+from afm_scan_ros.core.effects.base import LEVELS, CausalInverse, StatelessEffect, solved
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, rounded_into
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, looked_up, walk_copy
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
-
-LEVELS = 2049
-NEWTON_STEPS = 3
-"""The table starts within 1e-6 of the range; each step squares the error."""
 
 
 def terms(outputs: Array, lower: float, upper: float, count: int) -> Array:
@@ -91,12 +87,7 @@ class OutputMap(StatelessEffect):
 
     def output(self, inputs: Array) -> Array:
         """Effective inputs F (V) for the operator's outputs A (V), both (n,)."""
-        beyond = inputs - np.clip(inputs, self.lower, self.upper)
-        found = np.interp(inputs, self._bent, self._levels) + beyond
-        for _ in range(NEWTON_STEPS):
-            bent, slope = self._bend(found)
-            found = found - (bent - inputs) / slope
-        return found
+        return solved(self._bend, self._levels, self._bent, inputs)
 
 
 DEPOLARISING_CYCLES = 200

@@ -9,8 +9,8 @@ from attrs.validators import gt
 from numpy.typing import NDArray
 from scipy import signal
 
-from afm_scan_ros.core.effects.resonance import first_resonance
 from afm_scan_ros.core.effects.scale import half_range_of
+from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.creep.record import SHORTEST
 from afm_scan_ros.core.identification.drives.excitation import (

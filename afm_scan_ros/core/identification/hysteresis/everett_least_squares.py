@@ -17,7 +17,7 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy import sparse
 
-from afm_scan_ros.core.cascade import Cascade
+from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.effects.hysteresis.preisach import terms as map_terms
