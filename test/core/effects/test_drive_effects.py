@@ -201,3 +201,9 @@ def test_what_is_too_steep_is_refused_by_sample_slope_and_limit() -> None:
     assert caught.value.value == pytest.approx(1500.0)
     with pytest.raises(TooSteepError):
         effect.invert(state, np.array([np.nan]))
+
+
+def test_a_slow_ringing_settles_where_it_is_driven_at_a_high_rate() -> None:
+    effect = ringing_drive(0.05, 0.5, 1e-6)
+    found = effect.apply(effect.at_rest(), np.ones(1_000_000))[1]
+    assert found[-1] == pytest.approx(1.0, abs=1e-11)
