@@ -134,7 +134,7 @@ class HeldDrive(CausalInverse):
         numerator = denominator - np.convolve([0.0, mean], other).real
         series = scipy.signal.lfilter([1.0], numerator, np.eye(len(numerator))[0])
         inverse = Polynomial(np.convolve(denominator, series))
-        self._inverse: Array = np.asarray(inverse(Polynomial([1.0, -1.0])).coef, dtype=np.float64)
+        self._inverse: Array = np.real(inverse(Polynomial([1.0, -1.0])).coef)
 
     def at_rest(self) -> Array:
         """State of a scanner that has long rested at zero."""
