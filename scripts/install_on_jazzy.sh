@@ -42,6 +42,8 @@ enter "$ros"
 rosdep install -y --rosdistro jazzy --ignore-src --from-paths "$root" --skip-keys "${pip_keys[*]}"
 mkdir -p "$workspace"
 cd "$workspace"
+# colcon leaves the modules of an earlier version, and effects and features are found by their files.
+rm -rf build/afm_scan_ros install/afm_scan_ros
 colcon build --base-paths "$root" --packages-select afm_scan_ros
 
 # The system's numpy stays the only one: scipy and matplotlib of the system are built for it.

@@ -128,6 +128,10 @@ for part in CMakeLists.txt package.xml afm_scan_ros config launch msg resource; 
   ln -sfn "$root/$part" "$folder/source/$part"
 done
 cd "$folder"
+# colcon leaves what an earlier build linked, and a module that is gone would be found there.
+if [ -d install ]; then
+  find install -xtype l -delete
+fi
 AMENT_PREFIX_PATH='' PYTHONPATH='' ./run env AMENT_PREFIX_PATH="$venv" colcon --log-base log build \
   --base-paths source --packages-select afm_scan_ros --symlink-install \
   --event-handlers console_cohesion- --cmake-args -DBUILD_TESTING=OFF
