@@ -58,26 +58,46 @@ def identify_from_images(
 
     The grating repeats in two directions at right angles. The cells' own shape needs not be known.
 
-    Arguments:
-        images: each of at least three by three whole cells, and of a scan that nothing corrected.
-        pitch: distance of neighbouring cells, m, the same in both directions; of a chessboard that
-            along a row.
-        volts_per_metre: drive over commanded position, of both axes or of x and y. By default a
-            drive of 1 V stands for a commanded position of 1 µm.
-        progress: is called with what is being done.
-        accuracy: of the distance of a pitch, 1, rms over the image, that one image must reach
-            with 95 % certainty. Beside it twice as much is allowed, in y only for images as large.
+    Parameters
+    ----------
+    images
+        Each of at least three by three whole cells, and of a scan that nothing corrected.
+    pitch
+        Distance of neighbouring cells, m, the same in both directions; of a chessboard that along a
+        row.
+    volts_per_metre
+        Drive over commanded position, of both axes or of x and y. By default a drive of 1 V stands
+        for a commanded position of 1 µm.
+    progress
+        Is called with what is being done.
+    accuracy
+        Relative error of the distance of a pitch, rms over the image, that one image must reach
+        with 95 % certainty. The other images may err by twice as much, in y only those as large.
 
-    x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate it
-    from a lag or from creep: then all that differs between trace and retrace is taken for
-    hysteresis. Where line rates differ by a factor of two, creep and a resonance or a lag are
+    Returns
+    -------
+    ImageIdentification
+        The model, the positions of each image that was used, and why the others were refused: an
+        image that shows no such grating, whose positions do not settle or are not accurate enough.
+
+    Raises
+    ------
+    InputError
+        Where an image holds no retrace or states no time of a line; where all images are refused,
+        for the reason of the first.
+    ScanError
+        Where a fit does not converge.
+
+    Notes
+    -----
+    x has its gain and hysteresis, fitted to all images. Images of one line rate cannot separate
+    hysteresis from a lag or from creep: then all that differs between trace and retrace is taken
+    for hysteresis. Where line rates differ by a factor of two, creep and a resonance or a lag are
     sought in the same fit. y has a gain: that of the largest image, or the mean of the largest ones
     upwards and downwards, which is free of drift.
-    An image that shows no such grating, whose positions do not settle or are not accurate enough,
-    is refused, and the others are used. Raises InputError where an image holds no retrace or states
-    no time of a line; the error of the first image where all are refused; ScanError where a fit
-    does not converge.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> import afm_scan_ros as afm
     >>> x, y = np.meshgrid(np.linspace(-18e-6, 18e-6, 128), np.linspace(-18e-6, 18e-6, 128))
@@ -160,9 +180,28 @@ def _corrected_or_none(seen: RegisteredImage) -> ScanImage | None:
 def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1e6) -> ScanImage:
     """Return an image on a regular grid of the positions that a model predicts.
 
-    ``volts_per_metre`` is as in ``identify_from_images``. Raises InputError where the image's drive
-    leaves the range of the model, or where the image holds no retrace or states no time of a line.
+    Parameters
+    ----------
+    model
+        Of x and y.
+    image
+        Trace and retrace, with the time of a line.
+    volts_per_metre
+        As in ``identify_from_images``.
 
+    Returns
+    -------
+    ScanImage
+        Of the same size, less the line before which the scanner's path is not known.
+
+    Raises
+    ------
+    InputError
+        Where the image's drive leaves the range of the model, or where the image holds no retrace
+        or states no time of a line.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> import afm_scan_ros as afm
     >>> slope = np.tile(np.linspace(0.0, 1e-7, 64), (64, 1))

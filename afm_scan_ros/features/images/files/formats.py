@@ -63,19 +63,28 @@ WRITTEN = {
 def read_image(path: str | Path, channel: str | None = None) -> ScanImage:
     """Read one channel of an image, trace and retrace as far as the file holds them.
 
-    Arguments:
-        path: a file of Nanosurf (``.nid``), Gwyddion (``.gwy``, ``.gsf``), Bruker (``.spm``),
-            Asylum Research (``.ibw``) or Nanonis (``.sxm``), or an ``.npz`` file. The latter holds
-            the arrays ``trace`` and ``retrace``, and ``range_x`` and ``range_y`` in m. It may hold
-            the other fields of ``ScanImage``. All but ``.gwy`` and ``.npz`` need the extra
-            ``images``.
-        channel: its name in the file without its direction, as ``Topography``. By default the
-            first channel of the height that has both directions.
+    Parameters
+    ----------
+    path
+        A file of Nanosurf (``.nid``), Gwyddion (``.gwy``, ``.gsf``), Bruker (``.spm``), Asylum
+        Research (``.ibw``) or Nanonis (``.sxm``), or an ``.npz`` file. The latter holds the arrays
+        ``trace`` and ``retrace``, and ``range_x`` and ``range_y`` in m; it may hold the other
+        fields of ``ScanImage``. All but ``.gwy`` and ``.npz`` need the extra ``images``.
+    channel
+        Its name in the file without its direction, as ``Topography``. By default the first channel
+        of the height that has both directions.
 
-    Row 0 has the lowest y and column 0 the lowest x, also in the retrace, for every format. What
-    a file does not state is in the image's ``assumptions``, or None. Raises InputError, which
-    names the file and the fix, for a file that is missing, damaged or of another format. So it does
-    for a channel that is not there, and for a package that is not installed.
+    Returns
+    -------
+    ScanImage
+        Row 0 has the lowest y and column 0 the lowest x, also in the retrace, for every format.
+        What a file does not state is in the image's ``assumptions``, or None.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, damaged or of another format, for a channel that is not there,
+        and for a package that is not installed; it names the file and the fix.
     """
     path = path_of(path, "grating.gwy")
     known = FORMATS.get(path.suffix.lower())
