@@ -47,8 +47,8 @@ def refuse_same(records: Sequence[Record]) -> None:
     """
     for record, again in combinations(records, 2):
         info, other = info_of(record), info_of(again)
-        named = info.start != 0 and (info.scan_id, info.start) == (other.scan_id, other.start)
-        if named or _alike(record, again):
+        stated = info.start != 0 and (info.scan_id, info.start) == (other.scan_id, other.start)
+        if stated or _alike(record, again):
             raise InputError(
                 f"{again.name}: holds the same scan as {record.name}, which adds nothing new and"
                 " would count twice: give one of them"
@@ -272,6 +272,7 @@ def _coupled(
                 f"{record.name}: its axes are {', '.join(record.axes)}, and those of the model"
                 f" {', '.join(model.axes)}: give records of the model's axes, in its order"
             )
+        record.warn()
     found = diagnose_coupled(model.coupled, given, well, progress)
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")
     return Diagnosis(extended, given, model, found)

@@ -45,6 +45,8 @@ def identify_coupled_axes(
                 f" in {first.name}: give records of the same coupled axes"
             )
     given = named(records)
+    for record in given:
+        record.warn()
     setting = CoupledSetting(tuple(effects), states)
     scanner = identify_coupled(given, first.axes, setting, progress)
     return Model(scanner, f"identified from {', '.join(one.name for one in given)}")

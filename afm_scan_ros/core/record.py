@@ -160,11 +160,22 @@ class Record:
     def part(self, first: int, last: int) -> "Record":
         """Return the samples from ``first`` to before ``last``, which are of no whole scan.
 
-        Raises InputError where there is no sample between them.
+        Only a part that begins with the record begins in a state that is known. Raises InputError
+        where the record does not hold all of these samples, or there are none.
         """
-        kept = slice(first, last)
-        drive, displacement = self.drive[kept], self.displacement[kept]
-        return evolve(self, drive=drive, displacement=displacement, scan=None, info=None)
+        if not 0 <= first < last <= len(self.drive):
+            raise InputError(
+                f"{self.name or 'record'}: has no samples from {first} to before {last}: it holds"
+                f" {len(self.drive)}"
+            )
+        return evolve(
+            self,
+            drive=self.drive[first:last],
+            displacement=self.displacement[first:last],
+            start="unknown" if first else self.start,
+            scan=None,
+            info=None,
+        )
 
     def signals(self, axis: str) -> tuple[Array, Array]:
         """Return drive (V) and displacement (m) of an axis, (n,) each; zero of one not held."""
