@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 from attrs import fields
 
+from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.drivers.safety import SafetySettings
 
-SETTINGS: tuple[type, ...] = (SafetySettings,)
+SETTINGS: tuple[type, ...] = (SafetySettings, FitSettings)
 
 INTRODUCTION = """\
 # Settings

@@ -24,8 +24,9 @@ from afm_scan_ros.core.types import Array, floats
 def terms(outputs: Array, lower: float, upper: float, count: int) -> Array:
     """What each coefficient is multiplied by at outputs F (V) of shape (n,): shape (n, count)."""
     z = (2.0 * (outputs - lower) / (upper - lower) - 1.0)[:, np.newaxis]
-    powers = np.arange(count)
-    return np.asarray(z ** (powers + 2) - z ** (powers % 2))
+    inside, powers = np.clip(z, -1.0, 1.0), np.arange(count)
+    slope = (powers + 2) * inside ** (powers + 1) - powers % 2
+    return np.asarray(inside ** (powers + 2) - inside ** (powers % 2) + slope * (z - inside))
 
 
 @frozen
@@ -84,6 +85,10 @@ class OutputMap(StatelessEffect):
     def input(self, outputs: Array) -> Array:
         """Operator's outputs A (V) for effective inputs F (V), both (n,)."""
         return self._bend(outputs)[0]
+
+    def slope(self, outputs: Array) -> Array:
+        """dA/dF at effective inputs F (V), both (n,)."""
+        return self._bend(outputs)[1]
 
     def output(self, inputs: Array) -> Array:
         """Effective inputs F (V) for the operator's outputs A (V), both (n,)."""

@@ -1,0 +1,201 @@
+"""The linear part of an axis: vibration as a bank of poles, then creep.
+
+    V(s) = Σ_i Re κ_i / (1 - s / p_i),    C(s) = 1 + Σ_j g_j / (1 + s τ_j)
+
+A pole of a mode is complex, that of a lag real. The input is held between samples, and a sample is
+taken just before the update of the input, so that displacement k depends on inputs up to k - 1:
+
+    x_i[k + 1] = z_i x_i[k] + (1 - z_i) v[k],    z_i = exp(p_i T),    y[k] = Σ Re κ_i x_i[k]
+"""
+
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.creep import CreepModel
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.types import Array
+
+Complex = NDArray[np.complex128]
+
+
+@frozen(eq=False)
+class PoleBank:
+    """Poles (rad/s) with weights κ of unit sum, the complex ones first; creep's gains and τ (s)."""
+
+    poles: Complex
+    weights: Complex
+    gains: Array
+    time_constants: Array
+
+    @cached_property
+    def modes(self) -> int:
+        """Number of complex poles."""
+        return int(np.count_nonzero(self.poles.imag))
+
+    def parallel(self) -> tuple[Complex, Complex]:
+        """Poles and weights of V(s) C(s) as one bank."""
+        slow = -1.0 / self.time_constants
+        both = np.concatenate([self.poles, slow])
+        fast = self.weights * self._creep(self.poles)
+        late = self.gains * self._vibration(slow.astype(complex))
+        return both, np.concatenate([fast, late])
+
+    def _creep(self, s: Complex) -> Complex:
+        late = self.gains / (1.0 + s[:, np.newaxis] * self.time_constants)
+        return np.asarray(1.0 + late.sum(axis=1))
+
+    def _vibration(self, s: Complex) -> Complex:
+        one = self.weights / (1.0 - s[:, np.newaxis] / self.poles)
+        two = self.weights.conj() / (1.0 - s[:, np.newaxis] / self.poles.conj())
+        return np.asarray(0.5 * (one + two).sum(axis=1))
+
+    def vibration(self, gain: float) -> VibrationModel:
+        """V(s) times a gain (m/V) as polynomials of s."""
+        poles = np.concatenate([self.poles, self.poles[: self.modes].conj()])
+        halves = np.where(np.arange(len(self.poles)) < self.modes, 0.5, 1.0) * self.weights
+        weights = np.concatenate([halves, halves[: self.modes].conj()])
+        scale = float(np.exp(np.mean(np.log(np.abs(poles)))))
+        scaled = poles / scale
+        numerator = np.zeros(len(poles), complex)
+        for i, weight in enumerate(weights):
+            numerator += -weight * scaled[i] * np.poly(np.delete(scaled, i))
+        order = scale ** np.arange(len(poles) + 1)
+        return VibrationModel(
+            tuple(gain * numerator.real * order[1:]), tuple(np.poly(scaled).real * order)
+        )
+
+    def creep(self) -> CreepModel:
+        """C(s), without the time constants that have no gain."""
+        some = self.gains != 0.0
+        return CreepModel(tuple(self.gains[some]), tuple(self.time_constants[some]))
+
+
+@frozen(eq=False)
+class Response:
+    """Means over blocks of y, shape (blocks,), and of what its derivatives are made of.
+
+    ``states`` x_i and ``changes`` ∂x_i/∂p_i, shape (blocks, poles), are before the creep; ``late``
+    (blocks, time constants) is what each creep element makes of V's output.
+    """
+
+    output: Array
+    states: Complex
+    changes: Complex
+    late: Array
+
+
+def respond(
+    dynamics: PoleBank, period: float, inputs: Array, block: int, settled: float
+) -> Response:
+    """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
+    z = np.exp(dynamics.poles * period)
+    slow = np.exp(-period / dynamics.time_constants)
+    result = _respond(z, dynamics.weights, period, slow, dynamics.gains, inputs, block, settled)
+    return Response(*result)
+
+
+@compiled
+def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not objects
+    z: Complex,
+    weights: Complex,
+    period: float,
+    slow: Array,
+    gains: Array,
+    inputs: Array,
+    block: int,
+    settled: float,
+) -> tuple[Array, Complex, Complex, Array]:
+    blocks, n, m = inputs.size // block, z.size, slow.size
+    output, late = np.zeros(blocks), np.zeros((blocks, m))
+    states, changes = np.zeros((blocks, n), np.complex128), np.zeros((blocks, n), np.complex128)
+    x, d = np.full(n, settled + 0j), np.zeros(n, np.complex128)
+    c = np.full(m, settled * weights.real.sum())
+    share = 1.0 / block
+    for b in range(blocks):
+        for k in range(b * block, (b + 1) * block):
+            v, y = inputs[k], 0.0
+            for i in range(n):
+                y += weights[i].real * x[i].real - weights[i].imag * x[i].imag
+                states[b, i] += x[i]
+                changes[b, i] += d[i]
+                d[i] = z[i] * (d[i] + period * (x[i] - v))
+                x[i] = v + z[i] * (x[i] - v)
+            total = y
+            for j in range(m):
+                total += gains[j] * c[j]
+                late[b, j] += c[j]
+                c[j] = y + slow[j] * (c[j] - y)
+            output[b] += total
+        output[b] *= share
+        for i in range(n):
+            states[b, i] *= share
+            changes[b, i] *= share
+        for j in range(m):
+            late[b, j] *= share
+    return output, states, changes, late
+
+
+def filtered(
+    columns: Array,
+    poles: Complex,
+    weights: Complex,
+    direct: float,
+    length: float,
+    block: int,
+    settled: Array,
+) -> Array:
+    """Columns held over blocks of ``length`` (s) through a bank of poles, as means over blocks.
+
+    Before the first block each had settled at its value in ``settled``.
+    """
+    z = np.exp(poles * length)
+    mean = np.expm1(poles * length) / (block * np.expm1(poles * length / block))
+    order = np.argsort(poles.imag == 0.0, kind="stable")
+    n = int(np.count_nonzero(poles.imag))
+    return _filtered(columns, z[order], mean[order], weights[order], n, direct, settled)
+
+
+@compiled
+def _filtered(
+    columns: Array,
+    z: Complex,
+    mean: Complex,
+    weights: Complex,
+    modes: int,
+    direct: float,
+    settled: Array,
+) -> Array:
+    blocks, many = columns.shape
+    result = np.empty((blocks, many))
+    real, imag = np.zeros((z.size, many)), np.zeros((z.size, many))
+    for i in range(z.size):
+        for c in range(many):
+            real[i, c] = settled[c]
+    through = direct
+    for i in range(z.size):
+        rest = (1.0 - mean[i]) * weights[i]
+        through += rest.real
+    for b in range(blocks):
+        for c in range(many):
+            result[b, c] = through * columns[b, c]
+        for i in range(modes):
+            take = mean[i] * weights[i]
+            tr, ti, zr, zi = take.real, take.imag, z[i].real, z[i].imag
+            for c in range(many):
+                v = columns[b, c]
+                xr, xi = real[i, c], imag[i, c]
+                result[b, c] += tr * xr - ti * xi
+                xr -= v
+                real[i, c] = v + zr * xr - zi * xi
+                imag[i, c] = zr * xi + zi * xr
+        for i in range(modes, z.size):
+            tr, zr = mean[i].real * weights[i].real, z[i].real
+            for c in range(many):
+                v, xr = columns[b, c], real[i, c]
+                result[b, c] += tr * xr
+                real[i, c] = v + zr * (xr - v)
+    return result

@@ -1,0 +1,216 @@
+"""All records of an axis → θ, by Gauss-Newton steps on one likelihood.
+
+The mean over a block of n samples of record k is normal about the model's, with the variance
+
+    v_k = s_k² / n + (η a_k)²
+
+of the sensor's noise s_k and of a discrepancy η that is relative to the rms motion a_k. Both are
+estimated from the residuals after each step. What is free in each record (its offset, tones, and
+creep from before it) is linear and eliminated. The Jacobian holds inputs over blocks, the residual
+does not: so a step is approximate, and what it leads to is exact.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from attrs import define, evolve, field
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.evidence import best_scales, first_scales
+from afm_scan_ros.core.fit.operators import Columns
+from afm_scan_ros.core.fit.parameters import Layout, Mode
+from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, simulate
+from afm_scan_ros.core.fit.signals import Signals, averaged, noise_of
+from afm_scan_ros.core.fit.tones import find_tones
+from afm_scan_ros.core.types import Array
+
+Mask: TypeAlias = NDArray[np.bool_]
+
+LINEAR = ("lags", "modes")
+"""Groups of parameters that are fitted while the operator is held."""
+
+
+@define(eq=False)
+class AxisFit:
+    """A fit under way: θ (``theta``), the ``gain`` (m/V) and η (``discrepancy``, 1).
+
+    ``scales`` are standard deviations of priors. The gain stays as it is, for the operator has one.
+    """
+
+    layout: Layout
+    records: list[Signals]
+    gain: float
+    theta: Array
+    discrepancy: float = 1.0
+    scales: dict[str, float] = field()
+    _columns: dict[int, Columns] = field(factory=dict)
+
+    @scales.default
+    def _first(self) -> dict[str, float]:
+        return first_scales(self.layout.settings)
+
+    def variance(self, record: Signals) -> float:
+        """Variance v_k of the mean of a block, m²."""
+        return record.noise**2 / record.block + (self.discrepancy * record.motion) ** 2
+
+    def simulated(self, theta: Array | None = None) -> list[Simulation]:
+        """Simulate all records."""
+        given = self.theta if theta is None else theta
+        return [simulate(self.layout, given, record) for record in self.records]
+
+    def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
+        """Residuals (m) of the blocks that count, what is free in each record being fitted."""
+        result = []
+        for record, simulation in zip(self.records, simulations, strict=True):
+            left = record.mean - self.gain * simulation.response.output[record.used]
+            free = _Free(record, self.layout.time_constants, self.variance(record))
+            result.append(free.without(left))
+        return result
+
+    def misfit(self, simulations: Sequence[Simulation] | None = None) -> float:
+        """Half the weighted sum of squared residuals."""
+        pairs = zip(self.records, self.residuals(simulations or self.simulated()), strict=True)
+        return sum(0.5 * float(left @ left) / self.variance(record) for record, left in pairs)
+
+    def objective(self, theta: Array) -> float:
+        """Minus the logarithm of the posterior, but for a constant; infinite beyond all sense."""
+        precision, mean = self.layout.prior(self.scales, self.theta)
+        apart = theta - mean
+        try:
+            total = self.misfit(self.simulated(theta)) + 0.5 * float(apart @ precision @ apart)
+        except InputError:  # the map behind the operator turns back
+            return np.inf
+        return total if np.isfinite(total) else np.inf
+
+    def evidence(self) -> float:
+        """Logarithm of the marginal likelihood, by Laplace's approximation, but for a constant."""
+        precision, _ = self.layout.prior(self.scales, self.theta)
+        matrix, _ = self.normal(with_operator=True)
+        volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(matrix + precision)[1]
+        of_noise = sum(len(one.mean) * np.log(self.variance(one)) for one in self.records)
+        return float(0.5 * (volume - of_noise) - self.objective(self.theta))
+
+    def normal(self, *, with_operator: bool) -> tuple[Array, Array]:
+        """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,)."""
+        matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
+        simulations = self.simulated()
+        lefts = self.residuals(simulations)
+        for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
+            columns = self._columns_of(k) if with_operator else None
+            one = jacobian(self.layout, self.theta, record, simulation, columns) * self.gain
+            variance = self.variance(record)
+            free = _Free(record, self.layout.time_constants, variance)
+            cross = free.columns.T @ one / variance
+            matrix += one.T @ one / variance - cross.T @ np.linalg.solve(free.matrix, cross)
+            right += one.T @ lefts[k] / variance
+        return matrix, right
+
+    def step(self, groups: Sequence[str] = (), *, searching: bool = False) -> float:
+        """Take a step of some groups of parameters, or of all; return how far the objective fell.
+
+        Where ``searching``, the scales of the greatest evidence are chosen first. Creep has one
+        sign: a gain that would fall below zero stays there for this step.
+        """
+        parts = self.layout.parts
+        matrix, right = self.normal(with_operator=not set(groups) <= set(LINEAR) or not groups)
+        if searching:
+            self.scales = best_scales(self.layout, self.scales, self.theta, matrix, right)
+        precision, mean = self.layout.prior(self.scales, self.theta)
+        free = np.zeros(self.layout.size, bool)
+        for name in groups or parts:
+            free[parts[name]] = True
+        right = right - precision @ (self.theta - mean)
+        lowest = np.full(self.layout.size, -np.inf)
+        lowest[parts["creep"]] = -self.theta[parts["creep"]]
+        before = self.objective(self.theta)
+        for damping in (0.0, 1e-3, 1e-2, 0.1, 1.0):
+            damped = matrix + precision
+            damped[np.diag_indices_from(damped)] *= 1.0 + damping
+            move = _bounded(damped, right, free, lowest)
+            for length in (1.0, 0.5, 0.2, 0.05):
+                after = self.objective(self.theta + length * move)
+                if after < before:
+                    self.theta = self.theta + length * move
+                    return before - after
+        return 0.0
+
+    def settle(self, steps: int, groups: Sequence[str] = (), *, searching: bool = False) -> None:
+        """Take steps until the objective falls no more, weighing the records after each."""
+        for _ in range(steps):
+            fell = self.step(groups, searching=searching)
+            self.weigh()
+            if fell < self.layout.settings.converged:
+                break
+
+    def weigh(self) -> None:
+        """Estimate the noise of records whose blocks are samples, and η, from the residuals."""
+        excess, motion = 0.0, 0.0
+        for k, left in enumerate(self.residuals(self.simulated())):
+            record = self.records[k]
+            if record.block == 1:
+                record = self.records[k] = evolve(record, noise=noise_of(left))
+            noise = len(left) * record.noise**2 / record.block
+            excess += max(float(left @ left) - noise, 0.0)
+            motion += len(left) * record.motion**2
+        least = float(np.finfo(np.float32).eps)
+        self.discrepancy = max(float(np.sqrt(excess / motion)), least)
+
+    def find_tones(self) -> None:
+        """Let sines in the residuals be free in their records."""
+        for k, left in enumerate(self.residuals(self.simulated())):
+            record = self.records[k]
+            drive = averaged(record.drive, record.block)[record.used]
+            tones = find_tones(left, drive, record.length, self.layout.settings)
+            self.records[k] = evolve(record, tones=(*record.tones, *tones))
+        self.weigh()
+
+    def add(self, mode: Mode) -> None:
+        """Add a mode."""
+        self.layout, self.theta = self.layout.with_mode(self.theta, mode)
+
+    def lay_out(self, layout: Layout) -> None:
+        """Take another layout: the operator stays, the linear part begins anew."""
+        operator = self.theta[: self.layout.parts["map"].stop]
+        self.layout, self.theta = layout, layout.start()
+        self.theta[: len(operator)] = operator
+
+    def _columns_of(self, k: int) -> Columns:
+        """∂A/∂(operator) in a record; those of a linear operator are kept."""
+        operator, record = self.layout.operator, self.records[k]
+        if k not in self._columns or not operator.linear:
+            theta = self.layout.of_operator(self.theta)
+            self._columns[k] = operator.columns(
+                theta, record.drive, record.block, rested=record.rested
+            )
+        return self._columns[k]
+
+
+class _Free:
+    """What is free in one record, as linear regressors with their prior."""
+
+    def __init__(self, record: Signals, time_constants: Array, variance: float) -> None:
+        self.columns, self._variance = record.regressors(time_constants), variance
+        prior = np.diag([0.0, *np.ones(self.columns.shape[1] - 1)])
+        self.matrix = self.columns.T @ self.columns / variance + prior
+
+    def without(self, signal: Array) -> Array:
+        """Return a signal without what the regressors explain of it."""
+        right = self.columns.T @ signal / self._variance
+        return np.asarray(signal - self.columns @ np.linalg.solve(self.matrix, right))
+
+
+def _bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
+    """Solve for the move of free parameters; those that would pass the lowest are held there."""
+    move, loose = np.zeros(len(right)), free.copy()
+    for _ in range(len(right)):
+        held = free & ~loose
+        pull = right[loose] - matrix[np.ix_(loose, held)] @ move[held]
+        move[loose] = np.linalg.solve(matrix[np.ix_(loose, loose)], pull)
+        passed = loose & (move < lowest)
+        if not passed.any():
+            break
+        loose &= ~passed
+        move[passed] = lowest[passed]
+    return move

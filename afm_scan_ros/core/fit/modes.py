@@ -1,0 +1,65 @@
+"""The mode that a fit lacks most: each candidate's response to F against the residuals."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from afm_scan_ros.core.fit.dynamics import PoleBank, respond
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.parameters import Mode
+from afm_scan_ros.core.fit.sensitivity import Simulation
+from afm_scan_ros.core.types import Array
+
+
+def best_mode(fit: AxisFit) -> tuple[float, Mode]:
+    """Return by how much the best mode lowers the misfit, and that mode.
+
+    First over all frequencies that the records resolve, a band apart, then about the best.
+    """
+    simulations = fit.simulated()
+    given = simulations, fit.residuals(simulations)
+    damping = 0.03
+    lowest = min(40.0 * np.pi / (record.blocks * record.length) for record in fit.records)
+    highest = max(0.8 * np.pi / record.length for record in fit.records)
+    count = 2 + int(np.log(highest / lowest) / damping)
+    best = max(
+        (_gain(fit, *given, omega, damping) for omega in np.geomspace(lowest, highest, count)),
+        key=lambda found: found[0],
+    )
+    for _ in range(3):
+        omega, damping, *_ = best[1]
+        near = [
+            (omega * (1.0 + shift * damping), damping * factor)
+            for shift in (-1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0)
+            for factor in (0.4, 0.7, 1.0, 1.6)
+        ]
+        best = max((_gain(fit, *given, *one) for one in near), key=lambda found: found[0])
+    return best
+
+
+def _gain(
+    fit: AxisFit,
+    simulations: Sequence[Simulation],
+    lefts: Sequence[Array],
+    omega: float,
+    damping: float,
+) -> tuple[float, Mode]:
+    """Fall of the misfit by a mode that takes weight from all that is there, with a gain free."""
+    pole = np.array([omega * (-damping + 1j * np.sqrt(1.0 - damping**2))])
+    lone = PoleBank(pole, np.ones(1, complex), np.zeros(1), np.ones(1))
+    matrix, right = np.zeros((3, 3)), np.zeros(3)
+    for record, simulation, left in zip(fit.records, simulations, lefts, strict=True):
+        if omega * record.length > 0.9 * np.pi:
+            continue
+        settled = simulation.settled
+        response = respond(lone, record.period, simulation.effective, record.block, settled)
+        state, early = response.states[record.used, 0], simulation.response.output[record.used]
+        columns = fit.gain * np.column_stack([state.real - early, -state.imag, early])
+        columns -= columns.mean(axis=0)
+        matrix += columns.T @ columns / fit.variance(record)
+        right += columns.T @ left / fit.variance(record)
+    ridge = np.finfo(float).eps * np.trace(matrix) + 1e-300
+    real, imag, gain = np.linalg.solve(matrix + ridge * np.eye(3), right)
+    if np.hypot(real, imag) > fit.layout.settings.heaviest_mode:
+        return 0.0, (omega, damping, 0.0, 0.0)
+    return float(0.5 * right @ [real, imag, gain]), (omega, damping, float(real), float(imag))

@@ -1,0 +1,158 @@
+"""The parameters of an axis as one vector θ, with their priors.
+
+    y = gain · C(V(F)) + regressors of each record,    F: A = F + Σ_j c_j q_j(F),    A = P(u)
+
+with the operator P (``Operator``), the coefficients c_j of the map behind it (``OutputMap``), the
+weights κ of the lags and the modes of V, and the gains g of creep C (``PoleBank``).
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from attrs import evolve, frozen
+from scipy.linalg import block_diag
+
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
+from afm_scan_ros.core.fit.dynamics import PoleBank
+from afm_scan_ros.core.fit.operators import Operator
+from afm_scan_ros.core.fit.plays import second
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.types import Array
+
+Mode: TypeAlias = tuple[float, float, float, float]
+"""Angular frequency (rad/s), damping, and both parts of the weight κ."""
+
+SEARCHED = ("smooth_density", "rough_density", "correction", "output_map", "slopes", "creep")
+"""Settings that bound standard deviations, which are those of the greatest evidence."""
+
+
+@frozen(eq=False)
+class Layout:
+    """Which parameter is where in θ, and what is known of each beforehand.
+
+    ``lags`` (s), of which the first is faster than any record shows, and creep's
+    ``time_constants`` (s) have fixed places.
+    """
+
+    operator: Operator
+    lags: Array
+    time_constants: Array
+    settings: FitSettings
+    modes: int = 0
+
+    @cached_property
+    def parts(self) -> Mapping[str, slice]:
+        """Places of each group of parameters."""
+        sizes = {
+            **self.operator.parts,
+            "map": self.operator.bends,
+            "lags": len(self.lags),
+            "modes": 4 * self.modes,
+            "creep": len(self.time_constants),
+        }
+        ends = np.cumsum([0, *sizes.values()])
+        return {name: slice(a, b) for name, a, b in zip(sizes, ends[:-1], ends[1:], strict=True)}
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return int(self.parts["creep"].stop)
+
+    def start(self) -> Array:
+        """θ of no hysteresis, no creep, and no vibration that is seen."""
+        result = np.zeros(self.size)
+        result[: self.parts["map"].start] = self.operator.unbent()
+        result[self.parts["lags"].start] = 1.0
+        return result
+
+    def of_operator(self, theta: Array) -> Array:
+        """Return the operator's parameters."""
+        return theta[: self.parts["map"].start]
+
+    def map_of(self, theta: Array) -> OutputMap | None:
+        """Return the map from A to F; raises InputError where it turns back."""
+        bends = theta[self.parts["map"]]
+        ends = self.operator.lower, self.operator.upper
+        return OutputMap(*ends, tuple(bends)) if bends.any() else None
+
+    def of_modes(self, theta: Array) -> list[Mode]:
+        """Return the modes; a pair of poles stays complex."""
+        modes = theta[self.parts["modes"]].reshape(self.modes, 4)
+        return [
+            (float(np.exp(omega)), float(np.exp(min(damping, -0.05))), float(real), float(imag))
+            for omega, damping, real, imag in modes
+        ]
+
+    def dynamics(self, theta: Array) -> PoleBank:
+        """Return the linear part."""
+        modes = self.of_modes(theta)
+        poles = [
+            omega * (-damping + 1j * np.sqrt(1.0 - damping**2)) for omega, damping, *_ in modes
+        ]
+        weights = [real + 1j * imag for *_, real, imag in modes]
+        return PoleBank(
+            np.concatenate([poles, -1.0 / self.lags]),
+            np.concatenate([weights, theta[self.parts["lags"]]]),
+            theta[self.parts["creep"]],
+            self.time_constants,
+        )
+
+    def with_mode(self, theta: Array, mode: Mode) -> tuple["Layout", Array]:
+        """Add a mode, at the expense of the fastest lag."""
+        omega, damping, real, imag = mode
+        added = [np.log(omega), np.log(damping), real, imag]
+        more = np.insert(theta, self.parts["modes"].stop, added)
+        more[self.parts["lags"].start] -= real
+        return evolve(self, modes=self.modes + 1), more
+
+    def prior(self, scales: Mapping[str, float], theta: Array) -> tuple[Array, Array]:
+        """Precision of the prior, and its mean, shapes (size, size) and (size,).
+
+        The frequencies of modes are about those of ``theta``. All weights of V add up to one, which
+        only fixes how the gain is shared with the operator.
+        """
+        parts, s = self.parts, self.settings
+        groups = [self.operator.precision(name, scales) for name in self.operator.parts]
+        groups.append(
+            np.eye(self.operator.bends) / (scales["output_map"] * self.operator.half) ** 2
+        )
+        groups.append(np.diag([0.0, *np.full(len(self.lags) - 1, s.lag_weight**-2)]))
+        weight = s.heaviest_mode**-2
+        groups.append(np.diag(np.tile([1.0, 1.0, weight, weight], self.modes)))
+        bent = second(np.arange(float(len(self.time_constants))))
+        groups.append((bent.T @ bent + 0.1 * np.eye(bent.shape[1])) / scales["creep"] ** 2)
+        matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)
+        whole = np.zeros(self.size)
+        whole[parts["lags"]] = 1.0
+        whole[parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
+        matrix += np.outer(whole, whole) / np.finfo(np.float32).eps
+        mean[parts["lags"].start] = 1.0
+        of_modes = theta[parts["modes"]].reshape(self.modes, 4)
+        about = np.column_stack(
+            [of_modes[:, 0], np.full(self.modes, np.log(s.damping)), np.zeros((self.modes, 2))]
+        )
+        mean[parts["modes"]] = about.ravel()
+        return matrix, mean
+
+
+def layout_of(
+    operator: Operator,
+    longest: float,
+    shortest: float,
+    settings: FitSettings,
+    omega: float | None = None,
+) -> Layout:
+    """Places of lags and creep, by the longest record, the shortest sample period and a mode.
+
+    Both are in s, ``omega`` in rad/s. Without a mode there are no lags but the fastest.
+    """
+    seen, fastest = np.array([0.2 * shortest]), 10.0 * shortest
+    if omega is not None:
+        slowest = settings.slowest_lag / omega
+        lags = np.geomspace(slowest / 8.0, slowest, settings.fast_lags)
+        seen = np.concatenate([seen, lags])
+        fastest = max(settings.fastest_creep / omega, 5.0 * shortest)
+    count = max(round(settings.creep_per_decade * np.log10(longest / fastest)), 3)
+    return Layout(operator, seen, np.geomspace(fastest, longest, count), settings)

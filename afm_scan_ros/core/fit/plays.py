@@ -1,0 +1,219 @@
+"""A Preisach operator as plays, linear in its weights: the regressors of the hysteresis.
+
+    P(u) = Σ_r T_r(p_r(u)),    p_r(t) = min(u + r, max(u - r, p_r(t - 1)))
+
+``p_r`` is the play of threshold r (V), p_0 = u. ``T_r`` is a straight line of slope w_r, and a
+correction that lets the density vary along the other axis of the Preisach plane:
+
+    T_r'(p) = Δ_r (d_r + Σ_j c_j(r) b_j(p)),
+
+with the widths Δ_r of the grid of thresholds over the half range, the density d_r, and quadratic
+B-splines b_j of the play's position, whose coefficients c_j(r) are linear between a few thresholds.
+Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.3 and 2.4.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from attrs import field, frozen
+from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
+
+from afm_scan_ros.core.compiled import compiled
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.fit.operators import Columns
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Plays:
+    """Plays over a drive between ``lower`` and ``upper`` (V); see ``Operator``."""
+
+    lower: float = field(converter=float)
+    upper: float = field(converter=float)
+    settings: FitSettings = DEFAULT_SETTINGS
+    linear = True
+
+    @property
+    def half(self) -> float:
+        """Half the drive's range, V."""
+        return 0.5 * (self.upper - self.lower)
+
+    @property
+    def bends(self) -> int:
+        """Coefficients of the map behind the plays."""
+        return self.settings.map_terms
+
+    @property
+    def deepest(self) -> float:
+        """Largest threshold that the drive moves from depolarised rest at 0 V, over half the range.
+
+        One above 1 moves once, and is no part of the model between ``lower`` and ``upper``.
+        """
+        return max(abs(self.lower), abs(self.upper), self.half) / self.half
+
+    @cached_property
+    def thresholds(self) -> Array:
+        """Thresholds r (V), shape (plays,); the first is 0: the drive itself."""
+        s, step = self.settings, self.settings.play_step
+        small = np.geomspace(s.smallest_play, 2.0 * step, s.small_plays)
+        large = np.arange(3.0 * step, self.deepest - 0.5 * step, step)
+        return self.half * np.concatenate([[0.0], small, large])
+
+    @cached_property
+    def widths(self) -> Array:
+        """Share of the half range that each threshold stands for, shape (plays,); 1 for r = 0."""
+        share = self.thresholds / self.half
+        edges = np.concatenate([[0.0], 0.5 * (share[2:] + share[1:-1]), [self.deepest]])
+        return np.asarray(np.concatenate([[1.0], np.diff(edges)]))
+
+    @cached_property
+    def blend(self) -> Array:
+        """Hats of the coarse thresholds at each threshold, shape (plays, coarse).
+
+        They are denser towards small thresholds, as the density varies most there.
+        """
+        coarse = self.deepest * np.linspace(0.0, 1.0, self.settings.correction_plays) ** 1.5
+        share = self.thresholds / self.half
+        hats = [np.interp(share, coarse, one) for one in np.eye(len(coarse))]
+        return np.asarray(np.column_stack(hats))
+
+    @cached_property
+    def positions(self) -> Array:
+        """Positions of a play (V) at which T_r is tabulated, shape (table,): 128 in each cell."""
+        return np.linspace(self.lower, self.upper, 128 * self.settings.correction_cells + 1)
+
+    @cached_property
+    def rises(self) -> Array:
+        """Integrals of the B-splines over the position from the middle, V, (splines, table)."""
+        cells = self.settings.correction_cells
+        knots = np.arange(-2.0, cells + 3.0) / cells
+        place = np.linspace(0.0, 1.0, len(self.positions))
+        splines = (BSpline(knots, one, 2).antiderivative() for one in np.eye(cells + 2))
+        return np.asarray(2.0 * self.half * np.array([each(place) - each(0.5) for each in splines]))
+
+    @property
+    def parts(self) -> dict[str, int]:
+        """Number of parameters of each group."""
+        coarse = self.settings.correction_plays * len(self.rises)
+        return {"density": len(self.thresholds), "correction": coarse}
+
+    def unbent(self) -> Array:
+        """Weights of no hysteresis, F = u."""
+        return np.asarray(np.eye(sum(self.parts.values()))[0])
+
+    def precision(self, name: str, scales: Mapping[str, float]) -> Array:
+        """Precision of the prior of a group.
+
+        The density is smooth in the logarithm of the threshold, with a rough part; that of the
+        drive itself, the first, is nearly free.
+        """
+        if name == "correction":
+            rows, columns = self.settings.correction_plays, len(self.rises)
+            along, across = second(np.arange(float(rows))), second(np.arange(float(columns)))
+            bent = np.kron(along.T @ along, np.eye(columns))
+            bent += np.kron(np.eye(rows), across.T @ across)
+            return np.asarray((bent + 0.05 * np.eye(len(bent))) / scales["correction"] ** 2)
+        plays = len(self.thresholds) - 1
+        bent = second(np.log(self.thresholds[1:]))
+        smooth = bent.T @ bent / scales["smooth_density"] ** 2 + 0.25 * np.eye(plays)
+        rough = scales["rough_density"] ** 2 * np.eye(plays)
+        return np.asarray(block_diag(1.0, np.linalg.inv(np.linalg.inv(smooth) + rough)))
+
+    def start(self, drive: Array, *, rested: bool) -> Array:
+        """Plays before a drive (V): in their middle at depolarised rest, or else at its start."""
+        return np.full(len(self.thresholds), 0.0 if rested else float(drive[0]))
+
+    def tables(self, theta: Array) -> Array:
+        """T_r at the positions, shape (plays, table)."""
+        density, correction = np.split(theta, [len(self.thresholds)])
+        along = self.blend @ correction.reshape(-1, len(self.rises)) @ self.rises
+        return np.asarray(self.widths[:, np.newaxis] * (np.outer(density, self.positions) + along))
+
+    def output(self, theta: Array, drive: Array, *, rested: bool) -> Array:
+        """P(u) in V for a drive u (V), both (n,)."""
+        start, tables = self.start(drive, rested=rested), self.tables(theta)
+        scale = (len(self.positions) - 1) / (self.upper - self.lower)
+        return _output(drive, self.thresholds, start, tables, self.lower, scale)
+
+    def columns(self, _: Array, drive: Array, block: int, *, rested: bool) -> Columns:
+        """∂P/∂theta averaged over blocks of samples, shape (blocks, parameters).
+
+        In single precision: there may be gigabytes of them, and only steps are made of them.
+        """
+        mean = _means(drive, self.thresholds, self.start(drive, rested=rested), block)
+        mixing = self.widths[:, np.newaxis] * self.blend
+        plays = len(self.thresholds)
+        result = np.empty((len(mean), sum(self.parts.values())), np.float32)
+        result[:, :plays] = mean * self.widths
+        for j, rise in enumerate(self.rises):
+            along = np.interp(mean, self.positions, rise)
+            result[:, plays + j :: len(self.rises)] = along @ mixing
+        return result
+
+    def surface(self, theta: Array) -> EverettSurface:
+        """Return E(alpha, beta), with an output of zero at depolarised rest."""
+        levels = np.linspace(self.lower, self.upper, self.settings.surface_levels)
+        values, offset = np.zeros((len(levels),) * 2), 0.0
+        for r, table in zip(self.thresholds, self.tables(theta), strict=True):
+            top = levels[:, np.newaxis] - r
+            risen, fallen = (
+                np.interp(each, self.positions, table)
+                for each in (top, np.minimum(levels + r, top))
+            )
+            values += 0.5 * (risen - fallen)
+            ends = np.interp([self.lower + r, 0.0], self.positions, table)
+            offset += float(ends[0] - ends[1])
+        return EverettSurface(self.lower, self.upper, np.tril(values, -1), offset)
+
+
+@compiled
+def _output(
+    drive: Array, thresholds: Array, plays: Array, tables: Array, lower: float, scale: float
+) -> Array:
+    result = np.empty(drive.size)
+    last = tables.shape[1] - 2
+    kept = np.zeros(plays.size)
+    total = 0.0
+    for k in range(drive.size):
+        u = drive[k]
+        for i in range(plays.size):
+            p = min(u + thresholds[i], max(u - thresholds[i], plays[i]))
+            if k == 0 or p != plays[i]:
+                plays[i] = p
+                place = (p - lower) * scale
+                cell = min(max(int(place), 0), last)
+                value = tables[i, cell] + (place - cell) * (tables[i, cell + 1] - tables[i, cell])
+                total += value - kept[i]
+                kept[i] = value
+        result[k] = total
+    return result
+
+
+@compiled
+def _means(drive: Array, thresholds: Array, plays: Array, block: int) -> Array:
+    blocks = drive.size // block
+    result = np.zeros((blocks, plays.size))
+    for k in range(blocks):
+        for j in range(block):
+            u = drive[k * block + j]
+            for i in range(plays.size):
+                plays[i] = min(u + thresholds[i], max(u - thresholds[i], plays[i]))
+                result[k, i] += plays[i]
+        for i in range(plays.size):
+            result[k, i] /= block
+    return result
+
+
+def second(places: Array) -> Array:
+    """Second differences over uneven places, shape (n - 2, n), per unit of the mean distance."""
+    unit = (places[-1] - places[0]) / max(len(places) - 1, 1)
+    result = np.zeros((max(len(places) - 2, 0), len(places)))
+    for i in range(len(result)):
+        before, after = np.diff(places[i : i + 3]) / unit
+        scale = 2.0 / (before + after)
+        bend = np.array([1.0 / before, -1.0 / before - 1.0 / after, 1.0 / after])
+        result[i, i : i + 3] = scale * bend
+    return result

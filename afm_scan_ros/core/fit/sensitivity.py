@@ -1,0 +1,103 @@
+"""The model of a record: its displacement sample by sample, and ∂displacement/∂θ block by block."""
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.effects.hysteresis.preisach import terms
+from afm_scan_ros.core.fit.dynamics import PoleBank, Response, filtered, respond
+from afm_scan_ros.core.fit.operators import Columns
+from afm_scan_ros.core.fit.parameters import Layout
+from afm_scan_ros.core.fit.signals import Signals, averaged
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Simulation:
+    """Effective input F (V), (n,), the one at which the scanner had settled, and the response."""
+
+    effective: Array
+    settled: float
+    dynamics: PoleBank
+    response: Response
+
+
+def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
+    """Simulate a record exactly; raises InputError where the map behind the operator turns back."""
+    operator, mapped = layout.of_operator(theta), layout.map_of(theta)
+    before = np.zeros(1) if record.rested else record.drive[:1]
+    raw = layout.operator.output(operator, record.drive, rested=record.rested)
+    rest = layout.operator.output(operator, before, rested=record.rested)
+    if mapped is not None:
+        raw, rest = mapped.output(raw), mapped.output(rest)
+    settled, dynamics = float(rest[0]), layout.dynamics(theta)
+    response = respond(dynamics, record.period, raw, record.block, settled)
+    return Simulation(raw, settled, dynamics, response)
+
+
+def jacobian(
+    layout: Layout,
+    theta: Array,
+    record: Signals,
+    simulation: Simulation,
+    columns: Columns | None,
+) -> Array:
+    """∂y/∂θ for a gain of 1, averaged over the blocks that count, shape (blocks, size).
+
+    ``columns`` is ∂A/∂(operator), averaged over all blocks; without it the operator is held.
+    """
+    parts, used = layout.parts, record.used
+    result = np.zeros((used.stop - used.start, layout.size))
+    if columns is not None:
+        result[:, : parts["map"].stop] = _of_operator(layout, theta, record, simulation, columns)
+    result[:, parts["lags"].start : parts["modes"].stop] = _of_vibration(
+        layout, theta, record, simulation
+    )
+    result[:, parts["creep"]] = simulation.response.late[used]
+    return result
+
+
+def _of_operator(
+    layout: Layout, theta: Array, record: Signals, simulation: Simulation, columns: Columns
+) -> Array:
+    """Derivatives by the operator and its map, as inputs held over blocks, through V and C.
+
+    From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF).
+    """
+    operator, mapped = layout.operator, layout.map_of(theta)
+    effective = averaged(simulation.effective, record.block)
+    inputs = columns.astype(float)
+    if operator.bends:
+        bends = terms(effective, operator.lower, operator.upper, operator.bends)
+        inputs = np.hstack([inputs, -bends])
+    slope = np.ones_like(effective) if mapped is None else mapped.slope(effective)
+    inputs /= slope[:, np.newaxis]
+    settled = inputs[0].copy()
+    if record.rested:
+        rest = operator.columns(layout.of_operator(theta), np.zeros(1), 1, rested=True)[0]
+        settled[: len(rest)] = rest / slope[0]
+    bank = simulation.dynamics.parallel()
+    return filtered(inputs, *bank, 0.0, record.length, record.block, settled)[record.used]
+
+
+def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
+    """Derivatives by the weights of the lags, and by frequency, damping and weight of each mode."""
+    dynamics, response = simulation.dynamics, simulation.response
+    lags = response.states[:, dynamics.modes :].real
+    columns, settled = [lags], [np.full(lags.shape[1], simulation.settled)]
+    for i, (omega, damping, *_) in enumerate(layout.of_modes(theta)):
+        state, change = response.states[:, i], dynamics.weights[i] * response.changes[:, i]
+        pole = dynamics.poles[i]
+        turned = -omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
+        moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]
+        columns.append(np.column_stack(moved))
+        settled.append(np.array([0.0, 0.0, simulation.settled, 0.0]))
+    slow = (-1.0 / layout.time_constants).astype(np.complex128)
+    return filtered(
+        np.hstack(columns),
+        slow,
+        dynamics.gains.astype(np.complex128),
+        1.0,
+        record.length,
+        record.block,
+        np.concatenate(settled),
+    )[record.used]

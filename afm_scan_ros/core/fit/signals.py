@@ -1,0 +1,138 @@
+"""One axis of a record as the fit takes it: blocks of samples, with their noise."""
+
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Signals:
+    """Drive u (V) and displacement y (m), both (n,), that count from sample ``first`` on.
+
+    ``rested`` is whether the scanner had long rested at 0 V, depolarised. ``noise`` (m) is the
+    standard deviation of a sample, ``tones`` (Hz) are sines in the displacement.
+    """
+
+    name: str
+    drive: Array
+    displacement: Array
+    period: float
+    block: int
+    first: int
+    rested: bool
+    noise: float
+    tones: tuple[float, ...] = ()
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks, those before ``first`` included."""
+        return len(self.drive) // self.block
+
+    @property
+    def used(self) -> slice:
+        """The blocks that count."""
+        return slice(-(-self.first // self.block), self.blocks)
+
+    @cached_property
+    def mean(self) -> Array:
+        """Displacement averaged over the blocks that count, m."""
+        return averaged(self.displacement, self.block)[self.used]
+
+    @cached_property
+    def motion(self) -> float:
+        """Standard deviation of the displacement, m."""
+        return float(np.std(self.mean))
+
+    @property
+    def length(self) -> float:
+        """Length of a block, s."""
+        return self.block * self.period
+
+    @property
+    def seconds(self) -> Array:
+        """Time of the blocks that count, since the record's start."""
+        return np.asarray(self.length * (np.arange(self.blocks)[self.used] + 0.5))
+
+    def regressors(self, time_constants: Array) -> Array:
+        """What is free in a record of its own, for weights of standard deviation 1 but the first.
+
+        Its offset; what still creeps (time constants in s) where it began in motion; and its tones,
+        whose amplitudes may change along the record. Shape (blocks, regressors), m.
+        """
+        seconds = self.seconds[:, np.newaxis]
+        columns: list[Array] = [np.ones_like(seconds)]
+        if not self.rested:
+            columns.append(self.motion * np.exp(-seconds / time_constants))
+        for tone in self.tones:
+            turn, along = 2.0 * np.pi * tone * seconds, 2.0 * seconds / seconds[-1] - 1.0
+            pair = self.motion * np.hstack([np.cos(turn), np.sin(turn)])
+            columns += [pair, along * pair]
+        return np.concatenate(columns, axis=1)
+
+
+def signals_of(
+    name: str,
+    drive: Array,
+    displacement: Array,
+    period: float,
+    *,
+    depolarised: bool,
+    settings: FitSettings,
+) -> Signals:
+    """Choose the blocks of a record, and from where on its memory is known."""
+    noise = noise_of(displacement)
+    block = longest_block(drive, displacement, noise, settings)
+    first = known_from(drive, depolarised=depolarised)
+    return Signals(name, drive, displacement, period, block, first, depolarised, noise)
+
+
+def averaged(signal: Array, block: int) -> Array:
+    """Means over blocks, shape (blocks, …)."""
+    count = len(signal) // block
+    return np.asarray(signal[: count * block].reshape(count, block, *signal.shape[1:]).mean(axis=1))
+
+
+def noise_of(signal: Array) -> float:
+    """Standard deviation of the white noise in a signal, from third differences.
+
+    Their variance is 1 + 9 + 9 + 1 times that of the noise, and the median of the absolute value of
+    a normal variable is its standard deviation over 1.4826. A signal of no noise has that of
+    rounding to a float of single precision.
+    """
+    third = np.diff(signal, 3)
+    robust = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
+    return float(max(robust, float(np.finfo(np.float32).eps) * float(np.ptp(signal))))
+
+
+def longest_block(drive: Array, displacement: Array, noise: float, settings: FitSettings) -> int:
+    """Length of the longest blocks between whose means both signals are straight."""
+    block = 1
+    while len(drive) // (2 * block) >= settings.fewest_blocks:
+        longer = 2 * block
+        bent = _bend(drive, longer) > settings.bend * np.std(drive)
+        if bent or _bend(displacement, longer) ** 2 > (1.0 + settings.lost) * noise**2:
+            break
+        block = longer
+    return block
+
+
+def _bend(signal: Array, block: int) -> float:
+    """Rms distance of samples from straight lines between means of blocks."""
+    mean = averaged(signal, block)
+    place = (np.arange(len(mean) * block) - 0.5 * (block - 1)) / block
+    straight = np.interp(place, np.arange(len(mean)), mean)
+    return float(np.sqrt(np.mean((signal[: len(straight)] - straight)[block:-block] ** 2)))
+
+
+def known_from(drive: Array, *, depolarised: bool) -> int:
+    """Sample from which on the scanner's memory is known.
+
+    From an unknown start all is written anew when the drive has been at both of its ends.
+    """
+    if depolarised:
+        return 0
+    return max(int(np.argmax(drive)), int(np.argmin(drive)))

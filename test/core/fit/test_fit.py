@@ -1,0 +1,246 @@
+"""The joint fit of all records of an axis: derivatives, operators, tones, and what it finds."""
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+from attrs import evolve
+from scipy import signal
+
+import afm_scan_ros as afm
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.fit.axis import fit_axis, model_of, with_one_state
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.plays import Plays as PlayBank
+from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.signals import Signals, known_from, longest_block, noise_of, signals_of
+from afm_scan_ros.core.fit.tones import find_tones
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.types import Array
+
+PERIOD = 1e-4
+LIMIT = 3.6
+SETTINGS = FitSettings()
+
+
+def bent(value: Array) -> Array:
+    """A memoryless map, of some 4 % at the limits."""
+    return value + 0.01 * value**2 - 0.001 * value**3
+
+
+def of_plays(drive: Array) -> Array:
+    """Forty plays and the drive itself, from their middle."""
+    thresholds, play = np.linspace(0.05, 3.4, 40), np.zeros(40)
+    output = np.empty_like(drive)
+    for k, u in enumerate(drive):
+        play = np.clip(play, u - thresholds, u + thresholds)
+        output[k] = u + 0.012 * play.sum()
+    return output
+
+
+def of_duhem(drive: Array) -> Array:
+    """Coleman and Hodgdon: dF = 0.7 |du| (u - F) + 0.7 du, along each sample exactly."""
+    output, f, before = np.empty_like(drive), 0.0, 0.0
+    for k, u in enumerate(drive):
+        way = np.sign(u - before)
+        lag = way * 0.3 / 0.7
+        f = u - lag + (f - before + lag) * np.exp(-0.7 * abs(u - before))
+        output[k], before = f, u
+    return output
+
+
+def of_bouc_wen(drive: Array) -> Array:
+    """Low and Guo: F = u - h, dh = 0.35 du - 0.45 |du| h - 0.1 du |h|, in steps of 2 mV or less."""
+    output, h, before = np.empty_like(drive), 0.0, 0.0
+    for k, u in enumerate(drive):
+        steps = int(abs(u - before) / 2e-3) + 1
+        du = (u - before) / steps
+        for _ in range(steps):
+            middle = h + 0.5 * (0.35 * du - 0.45 * abs(du) * h - 0.1 * du * abs(h))
+            h += 0.35 * du - 0.45 * abs(du) * middle - 0.1 * du * abs(middle)
+        output[k], before = u - h, u
+    return output
+
+
+Operator: TypeAlias = Callable[[Array], Array]
+OPERATORS: dict[str, Operator] = {
+    "plays": of_plays,
+    "duhem": of_duhem,
+    "bouc_wen": of_bouc_wen,
+}
+
+
+def applied(operator: Operator, drive: Array) -> Array:
+    """Output of an operator between two maps."""
+    return bent(operator(bent(drive)))
+
+
+GAIN, FREQUENCY, DAMPING = 1e-6, 230.0, 0.03
+CREEP = 0.03, 0.4
+"""Gain and time constant, s."""
+
+
+def levels(seed: int, count: int, samples: int) -> Array:
+    """Random levels joined by ever faster ramps, from 0 and back."""
+    rng = np.random.default_rng(seed)
+    reached = np.concatenate([[0.0], rng.uniform(-LIMIT, LIMIT, count), [0.0]])
+    lengths = np.geomspace(samples, samples / 20.0, count + 1).round()
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    return np.asarray(np.interp(np.arange(ends[-1] + 1), ends, reached))
+
+
+def displaced(operator: Operator, drive: Array, period: float = PERIOD) -> Array:
+    """Displacement (m) of a scanner whose filters are SciPy's, without noise."""
+    omega = 2.0 * np.pi * FREQUENCY
+    system = [omega**2], [1.0, 2.0 * DAMPING * omega, omega**2]
+    above, below, _ = signal.cont2discrete(system, period)
+    early = signal.lfilter(above.ravel(), below, applied(operator, drive))
+    kept = np.exp(-period / CREEP[1])
+    late = signal.lfilter([0.0, 1.0 - kept], [1.0, -kept], early)
+    return np.asarray(GAIN * (early + CREEP[0] * late))
+
+
+def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
+    rng = np.random.default_rng(7)
+    seconds = PERIOD * np.arange(len(drive))
+    hum = tone * np.sin(2.0 * np.pi * 50.02 * seconds + 1.0)
+    moved = displaced(operator, drive) + hum + rng.normal(0.0, 0.2e-9, len(drive))
+    return afm.Record(drive, moved, PERIOD, start="depolarised", name="levels")
+
+
+def signals(drive: Array, moved: Array, block: int) -> Signals:
+    found = signals_of("a", drive, moved, PERIOD, depolarised=True, settings=SETTINGS)
+    return evolve(found, block=block)
+
+
+@pytest.fixture(scope="module")
+def drive() -> Array:
+    return levels(1, 14, 600)
+
+
+@pytest.mark.parametrize(("kind", "block"), [("plays", 1), ("plays", 4), ("one state", 1)])
+def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int) -> None:
+    rng = np.random.default_rng(3)
+    one = signals(drive, 1e-6 * drive, block)
+    operator = PlayBank(-LIMIT, LIMIT) if kind == "plays" else OneState(-LIMIT, LIMIT, (-1.5, 1.5))
+    layout = layout_of(operator, 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
+    layout, theta = layout.with_mode(layout.start(), (2.0 * np.pi * FREQUENCY, DAMPING, 0.8, 0.1))
+    for name, size in {"density": 0.3, "correction": 0.05, "slopes": 0.1, "map": 0.05}.items():
+        if name in layout.parts:
+            theta[layout.parts[name]] += size * rng.standard_normal(theta[layout.parts[name]].size)
+    theta[layout.parts["creep"]] = 0.02 * rng.random(theta[layout.parts["creep"]].size)
+    columns = operator.columns(layout.of_operator(theta), drive, block, rested=True)
+    found = jacobian(layout, theta, one, simulate(layout, theta, one), columns)
+    for place in rng.choice(layout.size, 60, replace=False):
+        step = 1e-5 * np.eye(layout.size)[place]
+        up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
+        slope = (up.response.output - down.response.output)[one.used] / 2e-5
+        motion = float(np.linalg.norm(slope)) + 1e-6
+        # Blocks hold the input, and a Duhem operator's steps are those of its integration.
+        close = 0.002 if (kind, block) == ("plays", 1) else 0.03
+        assert np.linalg.norm(slope - found[:, place]) < close * motion + 1e-5, place
+
+
+def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
+    rng = np.random.default_rng(5)
+    bank = PlayBank(-LIMIT, LIMIT)
+    theta = bank.unbent() * 0.8
+    theta[1:88] = 0.3 * rng.random(87)
+    theta[88:] = 0.02 * rng.standard_normal(len(theta) - 88)
+    surface = bank.surface(theta)
+    model = Preisach(surface)
+    of_model = model.apply(model.at_rest(), drive)[1]
+    of_plays = bank.output(theta, drive, rested=True)
+    apart = of_model - (of_plays - bank.output(theta, np.zeros(1), rested=True))
+    assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
+
+
+@pytest.mark.parametrize("family", ["duhem", "bouc_wen"])
+def test_one_state_follows_scanners_without_wiping_out(family: str) -> None:
+    """Equation error alone is close; the fit then goes on from it."""
+    path = levels(2, 60, 300)
+    output = applied(OPERATORS[family], path)
+    low, high = (output - path).min(), (output - path).max()
+    operator = OneState(-LIMIT, LIMIT, (low - 0.05, high + 0.05))
+    theta = operator.started([(path, output)])[0]
+    missed = operator.output(theta, path, rested=True) - output
+    assert np.std(missed) < 1e-3 * np.ptp(output)
+
+
+@pytest.mark.evidence
+@pytest.mark.parametrize("family", OPERATORS)
+def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
+    """A fresh drive is predicted to 0.1 % of its range, whatever the hysteresis."""
+    operator = OPERATORS[family]
+    fit = fit_axis([record(operator, levels(11, 60, 1500), tone=5e-9)], "x")
+    model = model_of(fit)
+    fresh = 0.9 * levels(23, 12, 1500)
+    true = displaced(operator, fresh)
+    cascade = forward(model, PERIOD)
+    predicted = cascade.apply(cascade.at_rest(), fresh)[1]
+    assert np.std(predicted - true) < 1e-3 * np.ptp(true)
+    slope = np.polyfit(true, predicted, 1)[0]
+    assert abs(slope - 1.0) < 2e-3
+    assert isinstance(fit.layout.operator, PlayBank if family == "plays" else OneState)
+    assert fit.records[0].tones == pytest.approx([50.02], abs=0.02)
+    omega, damping, *_ = fit.layout.of_modes(fit.theta)[0]
+    assert omega / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=1e-3)
+    assert damping == pytest.approx(DAMPING, rel=0.05)
+    assert fit.records[0].noise == pytest.approx(0.2e-9, rel=0.1)
+
+
+def test_a_tone_is_found_to_a_fortieth_of_a_bin_and_noise_has_none() -> None:
+    rng = np.random.default_rng(0)
+    seconds = PERIOD * np.arange(20_000)
+    noise = rng.standard_normal(len(seconds))
+    quiet = np.zeros(len(seconds))
+    assert find_tones(noise, quiet, PERIOD, SETTINGS) == []
+    tone = noise + 0.2 * np.sin(2.0 * np.pi * 153.7 * seconds)
+    (found,) = find_tones(tone, quiet, PERIOD, SETTINGS)
+    assert found == pytest.approx(153.7, abs=0.05)
+    driven = np.sin(2.0 * np.pi * 153.7 * seconds)
+    assert find_tones(tone, driven, PERIOD, SETTINGS) == []
+
+
+def test_noise_is_that_of_third_differences_whatever_moves_slowly() -> None:
+    rng = np.random.default_rng(1)
+    slow = np.sin(np.linspace(0.0, 20.0, 50_000))
+    assert noise_of(slow + 1e-3 * rng.standard_normal(len(slow))) == pytest.approx(1e-3, rel=0.03)
+
+
+def test_blocks_are_as_long_as_nothing_turns_within_them() -> None:
+    rng = np.random.default_rng(1)
+    slow = np.sin(np.linspace(0.0, 60.0, 100_000))
+    moved = slow + 1e-3 * rng.standard_normal(len(slow))
+    long = longest_block(slow, moved, 1e-3, SETTINGS)
+    short = longest_block(np.sin(np.linspace(0.0, 600.0, 100_000)), moved, 1e-3, SETTINGS)
+    assert long >= 32 > short
+
+
+def test_memory_is_known_from_rest_or_from_both_ends() -> None:
+    path = np.array([0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
+    assert known_from(path, depolarised=True) == 0
+    assert known_from(path, depolarised=False) == 3
+
+
+def test_no_record_that_moves_is_refused() -> None:
+    still = afm.Record(np.zeros(1000), np.zeros(1000), PERIOD)
+    with pytest.raises(afm.InputError, match="no record moves x: give one whose drive changes"):
+        fit_axis([still], "x")
+
+
+def test_the_fit_does_not_depend_on_the_order_of_records() -> None:
+    halves = [record(OPERATORS["plays"], levels(seed, 20, 1000)) for seed in (3, 4)]
+    one, two = (fit_axis(list(order), "x") for order in (halves, halves[::-1]))
+    assert isinstance(one, AxisFit)
+    fresh = 0.8 * levels(23, 12, 1500)
+    paths = []
+    for fit in (one, two):
+        cascade = forward(model_of(fit), PERIOD)
+        paths.append(cascade.apply(cascade.at_rest(), fresh)[1])
+    assert np.std(paths[0] - paths[1]) < 2e-4 * np.ptp(paths[0])
+    assert with_one_state(one).layout.operator.bends == 0
