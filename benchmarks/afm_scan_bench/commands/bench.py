@@ -58,7 +58,7 @@ LONG = {
         "scanners",
     ),
     "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),
-    "any_lab": ("any_lab",),
+    "any_lab": ("any_lab", "joint_fit"),
     "images": ("grating",),
     "learning": (
         "learning",
