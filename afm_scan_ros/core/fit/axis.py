@@ -32,7 +32,7 @@ def fit_axis(
     settings: FitSettings = DEFAULT_SETTINGS,
     progress: ProgressCallback = lambda _: None,
 ) -> AxisFit:
-    """AxisFit all parameters of an axis to all of its records; none needs a kind.
+    """Fit all parameters of an axis to all of its records; none needs a kind.
 
     Parameters
     ----------

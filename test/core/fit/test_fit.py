@@ -12,6 +12,7 @@ import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.fit.axis import fit_axis, model_of, with_one_state
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.evidence import evidence, first_scales
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
@@ -157,6 +158,44 @@ def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     of_plays = bank.output(theta, drive, rested=True)
     apart = of_model - (of_plays - bank.output(theta, np.zeros(1), rested=True))
     assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
+
+
+def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
+    """Two modes, lags and creep in parallel are the model's vibration with its creep behind."""
+    layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
+    theta = layout.start()
+    for mode in ((2.0 * np.pi * FREQUENCY, DAMPING, 0.8, -0.1), (3000.0, 0.2, 0.15, 0.05)):
+        layout, theta = layout.with_mode(theta, mode)
+    theta[layout.parts["lags"]] += 0.03 * np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0])
+    theta[layout.parts["creep"]] = 0.02
+    one = signals(drive, GAIN * drive, 1)
+    fit = AxisFit(layout, [one], GAIN, theta)
+    (simulation,) = fit.simulated()
+    cascade = forward(model_of(fit), PERIOD)
+    of_model = cascade.apply(cascade.at_rest(), drive)[1]
+    apart = of_model - GAIN * simulation.response.output
+    assert np.abs(apart).max() < 1e-6 * np.ptp(of_model)
+
+
+def test_the_evidence_is_the_marginal_likelihood_of_a_linear_model() -> None:
+    """Between two scales of the prior it differs as the normal densities of the data do."""
+    rng = np.random.default_rng(2)
+    layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS)
+    theta, count = layout.start(), 30
+    columns = rng.standard_normal((count, layout.size))
+    data = columns @ theta + rng.standard_normal(count)
+    values, exact = [], []
+    for size in (0.01, 0.1):
+        scales = {**first_scales(SETTINGS), "correction": size}
+        right = columns.T @ (data - columns @ theta)
+        values.append(evidence(layout, scales, theta, columns.T @ columns, right))
+        precision, mean = layout.prior(scales, theta)
+        precision += 1e-9 * np.eye(len(precision))
+        covariance = np.eye(count) + columns @ np.linalg.solve(precision, columns.T)
+        missed = data - columns @ mean
+        volume = np.linalg.slogdet(covariance)[1]
+        exact.append(-0.5 * (missed @ np.linalg.solve(covariance, missed) + volume))
+    assert values[1] - values[0] == pytest.approx(exact[1] - exact[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("family", ["duhem", "bouc_wen"])
