@@ -65,7 +65,7 @@ class AxisFit:
         result = []
         for record, simulation in zip(self.records, simulations, strict=True):
             left = record.mean - self.gain * simulation.response.output[record.used]
-            free = _Free(record, self.layout.time_constants, self.variance(record))
+            free = _Free(record, self.layout, self.variance(record))
             result.append(free.without(left))
         return result
 
@@ -101,7 +101,7 @@ class AxisFit:
             columns = self._columns_of(k) if with_operator else None
             one = jacobian(self.layout, self.theta, record, simulation, columns) * self.gain
             variance = self.variance(record)
-            free = _Free(record, self.layout.time_constants, variance)
+            free = _Free(record, self.layout, variance)
             cross = free.columns.T @ one / variance
             matrix += one.T @ one / variance - cross.T @ np.linalg.solve(free.matrix, cross)
             right += one.T @ lefts[k] / variance
@@ -190,8 +190,9 @@ class AxisFit:
 class _Free:
     """What is free in one record, as linear regressors with their prior."""
 
-    def __init__(self, record: Signals, time_constants: Array, variance: float) -> None:
-        self.columns, self._variance = record.regressors(time_constants), variance
+    def __init__(self, record: Signals, layout: Layout, variance: float) -> None:
+        self.columns = record.regressors(layout.time_constants, layout.settings.creep)
+        self._variance = variance
         prior = np.diag([0.0, *np.ones(self.columns.shape[1] - 1)])
         self.matrix = self.columns.T @ self.columns / variance + prior
 

@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 from attrs import frozen
 
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
@@ -57,16 +58,17 @@ class Signals:
         """Time of the blocks that count, since the record's start."""
         return np.asarray(self.length * (np.arange(self.blocks)[self.used] + 0.5))
 
-    def regressors(self, time_constants: Array) -> Array:
+    def regressors(self, time_constants: Array, creep: float) -> Array:
         """What is free in a record of its own, for weights of standard deviation 1 but the first.
 
-        Its offset; what still creeps (time constants in s) where it began in motion; and its tones,
-        whose amplitudes may change along the record. Shape (blocks, regressors), m.
+        Its offset; what still creeps (time constants in s, by a share ``creep`` of the motion)
+        where it began in motion; and its tones, whose amplitudes may change along the record.
+        Shape (blocks, regressors), m.
         """
         seconds = self.seconds[:, np.newaxis]
         columns: list[Array] = [np.ones_like(seconds)]
         if not self.rested:
-            columns.append(self.motion * np.exp(-seconds / time_constants))
+            columns.append(creep * self.motion * np.exp(-seconds / time_constants))
         for tone in self.tones:
             turn, along = 2.0 * np.pi * tone * seconds, 2.0 * seconds / seconds[-1] - 1.0
             pair = self.motion * np.hstack([np.cos(turn), np.sin(turn)])
@@ -87,6 +89,12 @@ def signals_of(
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
     first = known_from(drive, depolarised=depolarised)
+    if len(drive) - first < settings.fewest_blocks:
+        raise InputError(
+            f"{name}: its drive reaches the second of its ends only {len(drive) - first} samples"
+            " before the record's end, so that nothing is known of what the material remembered"
+            " before: record on, or begin depolarised at rest and state it"
+        )
     return Signals(name, drive, displacement, period, block, first, depolarised, noise)
 
 

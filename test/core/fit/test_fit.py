@@ -266,6 +266,13 @@ def test_memory_is_known_from_rest_or_from_both_ends() -> None:
     assert known_from(path, depolarised=False) == 3
 
 
+def test_a_record_whose_memory_is_never_known_is_refused_by_name() -> None:
+    rise = np.linspace(0.0, 1.0, 1000)
+    record = afm.Record(rise, GAIN * rise, PERIOD, name="rise")
+    with pytest.raises(afm.InputError, match="rise: its drive reaches the second of its ends only"):
+        fit_axis([record], "x")
+
+
 def test_no_record_that_moves_is_refused() -> None:
     still = afm.Record(np.zeros(1000), np.zeros(1000), PERIOD)
     with pytest.raises(afm.InputError, match="no record moves x: give one whose drive changes"):
