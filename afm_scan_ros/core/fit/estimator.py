@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.evidence import best_scales, first_scales
-from afm_scan_ros.core.fit.operators import Columns
-from afm_scan_ros.core.fit.parameters import Layout, Mode
+from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
 from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, simulate
 from afm_scan_ros.core.fit.signals import Signals, averaged, noise_of
 from afm_scan_ros.core.fit.tones import find_tones
@@ -28,8 +27,8 @@ from afm_scan_ros.core.types import Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
-LINEAR = ("lags", "modes")
-"""Groups of parameters that are fitted while the operator is held."""
+VIBRATION = ("lags", "modes")
+"""Groups of parameters of V, which can be fitted while the operator is held."""
 
 
 @define(eq=False)
@@ -55,10 +54,9 @@ class AxisFit:
         """Variance v_k of the mean of a block, m²."""
         return record.noise**2 / record.block + (self.discrepancy * record.motion) ** 2
 
-    def simulated(self, theta: Array | None = None) -> list[Simulation]:
+    def simulated(self, theta: Array) -> list[Simulation]:
         """Simulate all records."""
-        given = self.theta if theta is None else theta
-        return [simulate(self.layout, given, record) for record in self.records]
+        return [simulate(self.layout, theta, record) for record in self.records]
 
     def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
@@ -69,17 +67,17 @@ class AxisFit:
             result.append(free.without(left))
         return result
 
-    def misfit(self, simulations: Sequence[Simulation] | None = None) -> float:
+    def misfit(self, theta: Array) -> float:
         """Half the weighted sum of squared residuals."""
-        pairs = zip(self.records, self.residuals(simulations or self.simulated()), strict=True)
+        pairs = zip(self.records, self.residuals(self.simulated(theta)), strict=True)
         return sum(0.5 * float(left @ left) / self.variance(record) for record, left in pairs)
 
     def objective(self, theta: Array) -> float:
-        """Minus the logarithm of the posterior, but for a constant; infinite beyond all sense."""
+        """Minus the logarithm of the posterior, but for a constant; infinite where it overflows."""
         precision, mean = self.layout.prior(self.scales, self.theta)
         apart = theta - mean
         try:
-            total = self.misfit(self.simulated(theta)) + 0.5 * float(apart @ precision @ apart)
+            total = self.misfit(theta) + 0.5 * float(apart @ precision @ apart)
         except InputError:  # the map behind the operator turns back
             return np.inf
         return total if np.isfinite(total) else np.inf
@@ -95,7 +93,7 @@ class AxisFit:
     def normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,)."""
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
-        simulations = self.simulated()
+        simulations = self.simulated(self.theta)
         lefts = self.residuals(simulations)
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             columns = self._columns_of(k) if with_operator else None
@@ -114,12 +112,13 @@ class AxisFit:
         sign: a gain that would fall below zero stays there for this step.
         """
         parts = self.layout.parts
-        matrix, right = self.normal(with_operator=not set(groups) <= set(LINEAR) or not groups)
+        groups = groups or tuple(parts)
+        matrix, right = self.normal(with_operator=not set(groups) <= set(VIBRATION))
         if searching:
             self.scales = best_scales(self.layout, self.scales, self.theta, matrix, right)
         precision, mean = self.layout.prior(self.scales, self.theta)
         free = np.zeros(self.layout.size, bool)
-        for name in groups or parts:
+        for name in groups:
             free[parts[name]] = True
         right = right - precision @ (self.theta - mean)
         lowest = np.full(self.layout.size, -np.inf)
@@ -147,7 +146,7 @@ class AxisFit:
     def weigh(self) -> None:
         """Estimate the noise of records whose blocks are samples, and η, from the residuals."""
         excess, motion = 0.0, 0.0
-        for k, left in enumerate(self.residuals(self.simulated())):
+        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
             record = self.records[k]
             if record.block == 1:
                 record = self.records[k] = evolve(record, noise=noise_of(left))
@@ -159,7 +158,7 @@ class AxisFit:
 
     def find_tones(self) -> None:
         """Let sines in the residuals be free in their records."""
-        for k, left in enumerate(self.residuals(self.simulated())):
+        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
             record = self.records[k]
             drive = averaged(record.drive, record.block)[record.used]
             tones = find_tones(left, drive, record.length, self.layout.settings)

@@ -14,16 +14,17 @@ from afm_scan_ros.core.types import Array
 def best_mode(fit: AxisFit) -> tuple[float, Mode]:
     """Return by how much the best mode lowers the misfit, and that mode.
 
-    First over all frequencies that the records resolve, a band apart, then about the best.
+    The search goes over all frequencies that the records resolve, in steps of a half-power
+    bandwidth, and then about the best of them.
     """
-    simulations = fit.simulated()
+    simulations = fit.simulated(fit.theta)
     given = simulations, fit.residuals(simulations)
-    damping = 0.03
+    damping = fit.layout.settings.damping
     lowest = min(40.0 * np.pi / (record.blocks * record.length) for record in fit.records)
     highest = max(0.8 * np.pi / record.length for record in fit.records)
-    count = 2 + int(np.log(highest / lowest) / damping)
+    count = 2 + int(np.log(highest / lowest) / (2.0 * damping))
     best = max(
-        (_gain(fit, *given, omega, damping) for omega in np.geomspace(lowest, highest, count)),
+        (_explained(fit, *given, omega, damping) for omega in np.geomspace(lowest, highest, count)),
         key=lambda found: found[0],
     )
     for _ in range(3):
@@ -33,18 +34,21 @@ def best_mode(fit: AxisFit) -> tuple[float, Mode]:
             for shift in (-1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0)
             for factor in (0.4, 0.7, 1.0, 1.6)
         ]
-        best = max((_gain(fit, *given, *one) for one in near), key=lambda found: found[0])
+        best = max((_explained(fit, *given, *one) for one in near), key=lambda found: found[0])
     return best
 
 
-def _gain(
+def _explained(
     fit: AxisFit,
     simulations: Sequence[Simulation],
     lefts: Sequence[Array],
     omega: float,
     damping: float,
 ) -> tuple[float, Mode]:
-    """Fall of the misfit by a mode that takes weight from all that is there, with a gain free."""
+    """Return by how much a mode lowers the misfit, and the mode with its weight κ.
+
+    What the mode gets, the vibration so far loses; the gain is free.
+    """
     pole = np.array([omega * (-damping + 1j * np.sqrt(1.0 - damping**2))])
     lone = PoleBank(pole, np.ones(1, complex), np.zeros(1), np.ones(1))
     matrix, right = np.zeros((3, 3)), np.zeros(3)

@@ -15,7 +15,6 @@ from attrs import frozen
 from afm_scan_ros.core.effects.hysteresis.branches import by_input, sensitivities
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.preisach import AT_ONCE
-from afm_scan_ros.core.fit.operators import Columns
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import averaged
 from afm_scan_ros.core.types import Array
@@ -25,7 +24,7 @@ from afm_scan_ros.core.types import Array
 class OneState:
     """Slopes over a drive from ``lower`` to ``upper`` and w between both ``widths``, V.
 
-    See ``Operator``. No map is fitted behind it, which such an operator contains.
+    No map is fitted behind it, which such an operator contains.
     """
 
     lower: float
@@ -76,7 +75,7 @@ class OneState:
         line = np.ones(count + 3), np.linspace(self.lower, self.upper, count + 1)
         return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
 
-    def columns(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Columns:
+    def columns(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Array:
         """∂A/∂theta for the mean drive of each block, shape (blocks, parameters)."""
         path = averaged(drive, block)
         start = 0.0 if rested else float(drive[0]), 0.0

@@ -2,7 +2,7 @@
 
     y = gain · C(V(F)) + regressors of each record,    F: A = F + Σ_j c_j q_j(F),    A = P(u)
 
-with the operator P (``Operator``), the coefficients c_j of the map behind it (``OutputMap``), the
+with the operator P (``Plays`` or ``OneState``), the coefficients c_j of the map behind it (``OutputMap``), the
 weights κ of the lags and the modes of V, and the gains g of creep C (``PoleBank``).
 """
 
@@ -12,14 +12,19 @@ from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.fit.dynamics import PoleBank
-from afm_scan_ros.core.fit.operators import Operator
-from afm_scan_ros.core.fit.plays import second
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
+
+Operator: TypeAlias = Plays | OneState
+Columns: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
+"""∂A/∂(operator) averaged over blocks, shape (blocks, parameters)."""
 
 Mode: TypeAlias = tuple[float, float, float, float]
 """Angular frequency (rad/s), damping, and both parts of the weight κ."""
@@ -110,8 +115,9 @@ class Layout:
     def prior(self, scales: Mapping[str, float], theta: Array) -> tuple[Array, Array]:
         """Precision of the prior, and its mean, shapes (size, size) and (size,).
 
-        The frequencies of modes are about those of ``theta``. All weights of V add up to one, which
-        only fixes how the gain is shared with the operator.
+        The frequency of a mode is that of ``theta`` within a factor of e, its damping that of the
+        settings within the same factor, one standard deviation each. All weights of V add up to
+        one, which only fixes how the gain is shared with the operator.
         """
         parts, s = self.parts, self.settings
         groups = [self.operator.precision(name, scales) for name in self.operator.parts]
@@ -121,7 +127,7 @@ class Layout:
         groups.append(np.diag([0.0, *np.full(len(self.lags) - 1, s.lag_weight**-2)]))
         weight = s.heaviest_mode**-2
         groups.append(np.diag(np.tile([1.0, 1.0, weight, weight], self.modes)))
-        bent = second(np.arange(float(len(self.time_constants))))
+        bent = np.diff(np.eye(len(self.time_constants)), 2, axis=0)
         groups.append((bent.T @ bent + 0.1 * np.eye(bent.shape[1])) / scales["creep"] ** 2)
         matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)
         whole = np.zeros(self.size)
@@ -129,11 +135,9 @@ class Layout:
         whole[parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
         matrix += np.outer(whole, whole) / np.finfo(np.float32).eps
         mean[parts["lags"].start] = 1.0
-        of_modes = theta[parts["modes"]].reshape(self.modes, 4)
-        about = np.column_stack(
-            [of_modes[:, 0], np.full(self.modes, np.log(s.damping)), np.zeros((self.modes, 2))]
-        )
-        mean[parts["modes"]] = about.ravel()
+        first, last = parts["modes"].start, parts["modes"].stop
+        mean[first:last:4] = theta[first:last:4]
+        mean[first + 1 : last : 4] = np.log(s.damping)
         return matrix, mean
 
 

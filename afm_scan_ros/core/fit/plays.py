@@ -17,19 +17,19 @@ from functools import cached_property
 
 import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
-from afm_scan_ros.core.fit.operators import Columns
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.types import Array
 
 
 @frozen(eq=False)
 class Plays:
-    """Plays over a drive between ``lower`` and ``upper`` (V); see ``Operator``."""
+    """Plays over a drive between ``lower`` and ``upper`` (V)."""
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
@@ -112,13 +112,15 @@ class Plays:
         """
         if name == "correction":
             rows, columns = self.settings.correction_plays, len(self.rises)
-            along, across = second(np.arange(float(rows))), second(np.arange(float(columns)))
+            along, across = (np.diff(np.eye(size), 2, axis=0) for size in (rows, columns))
             bent = np.kron(along.T @ along, np.eye(columns))
             bent += np.kron(np.eye(rows), across.T @ across)
             return np.asarray((bent + 0.05 * np.eye(len(bent))) / scales["correction"] ** 2)
         plays = len(self.thresholds) - 1
-        bent = second(np.log(self.thresholds[1:]))
-        smooth = bent.T @ bent / scales["smooth_density"] ** 2 + 0.25 * np.eye(plays)
+        bent = _bends(np.log(self.thresholds[1:]))
+        smooth = (
+            bent.T @ bent / scales["smooth_density"] ** 2 + np.eye(plays) / self.settings.density**2
+        )
         rough = scales["rough_density"] ** 2 * np.eye(plays)
         return np.asarray(block_diag(1.0, np.linalg.inv(np.linalg.inv(smooth) + rough)))
 
@@ -138,7 +140,7 @@ class Plays:
         scale = (len(self.positions) - 1) / (self.upper - self.lower)
         return _output(drive, self.thresholds, start, tables, self.lower, scale)
 
-    def columns(self, _: Array, drive: Array, block: int, *, rested: bool) -> Columns:
+    def columns(self, _: Array, drive: Array, block: int, *, rested: bool) -> NDArray[np.float32]:
         """∂P/∂theta averaged over blocks of samples, shape (blocks, parameters).
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
@@ -154,18 +156,21 @@ class Plays:
         return result
 
     def surface(self, theta: Array) -> EverettSurface:
-        """Return E(alpha, beta), with an output of zero at depolarised rest."""
+        """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
+
+        Plays that the range cannot push both ways do not move within it.
+        """
         levels = np.linspace(self.lower, self.upper, self.settings.surface_levels)
         values, offset = np.zeros((len(levels),) * 2), 0.0
-        for r, table in zip(self.thresholds, self.tables(theta), strict=True):
+        moving = self.thresholds <= self.half
+        for r, table in zip(self.thresholds[moving], self.tables(theta)[moving], strict=True):
             top = levels[:, np.newaxis] - r
             risen, fallen = (
                 np.interp(each, self.positions, table)
                 for each in (top, np.minimum(levels + r, top))
             )
             values += 0.5 * (risen - fallen)
-            ends = np.interp([self.lower + r, 0.0], self.positions, table)
-            offset += float(ends[0] - ends[1])
+            offset += float(np.interp(self.lower + r, self.positions, table))
         return EverettSurface(self.lower, self.upper, np.tril(values, -1), offset)
 
 
@@ -207,13 +212,12 @@ def _means(drive: Array, thresholds: Array, plays: Array, block: int) -> Array:
     return result
 
 
-def second(places: Array) -> Array:
+def _bends(places: Array) -> Array:
     """Second differences over uneven places, shape (n - 2, n), per unit of the mean distance."""
-    unit = (places[-1] - places[0]) / max(len(places) - 1, 1)
-    result = np.zeros((max(len(places) - 2, 0), len(places)))
+    unit = (places[-1] - places[0]) / (len(places) - 1)
+    result = np.zeros((len(places) - 2, len(places)))
     for i in range(len(result)):
         before, after = np.diff(places[i : i + 3]) / unit
-        scale = 2.0 / (before + after)
         bend = np.array([1.0 / before, -1.0 / before - 1.0 / after, 1.0 / after])
-        result[i, i : i + 3] = scale * bend
+        result[i, i : i + 3] = 2.0 / (before + after) * bend
     return result

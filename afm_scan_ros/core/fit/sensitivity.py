@@ -5,8 +5,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
 from afm_scan_ros.core.fit.dynamics import PoleBank, Response, filtered, respond
-from afm_scan_ros.core.fit.operators import Columns
-from afm_scan_ros.core.fit.parameters import Layout
+from afm_scan_ros.core.fit.parameters import Columns, Layout
 from afm_scan_ros.core.fit.signals import Signals, averaged
 from afm_scan_ros.core.types import Array
 

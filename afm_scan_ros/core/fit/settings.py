@@ -10,150 +10,245 @@ class FitSettings:
     """What the fit of an axis resolves, expects beforehand, and takes for significant."""
 
     smallest_play: float = setting(
-        1e-3, "half range", "smallest threshold of the plays", "a scan of 1/500 of the range turns"
+        1e-3,
+        "half range",
+        "smallest threshold of the plays",
+        "a scan of 1/500 of the range still moves this play",
     )
     play_step: float = setting(
         1.0 / 80.0,
         "half range",
-        "distance of the larger thresholds",
-        "steps twice as long leave twice the error on fresh scans",
+        "distance between the larger thresholds",
+        "twice the step doubles the error on fresh scans",
     )
     small_plays: int = setting(
         9,
         "1",
-        "thresholds in geometric steps below two play_steps",
-        "1.5 to each, as a density is smooth",
+        "thresholds in geometric steps up to two play_steps",
+        "each is 1.5 times the last",
     )
     correction_plays: int = setting(
-        11, "1", "thresholds between which the correction is linear", "the correction is coarse"
+        11,
+        "1",
+        "thresholds between which the correction is linear",
+        "the correction is smooth",
     )
     correction_cells: int = setting(
-        4, "1", "cells of the correction's splines over the range", "the correction is coarse"
+        4,
+        "1",
+        "cells of the correction's splines over the range",
+        "the correction is smooth",
     )
     surface_levels: int = setting(
-        161, "1", "levels of the Everett surface of a model", "one for each play_step"
+        161,
+        "1",
+        "levels of the model's Everett surface",
+        "one for each play_step over the range",
     )
     direct_levels: int = setting(
-        41, "1", "levels of the direct inverse's surface", "its error is that of the method, 0.5 %"
+        41,
+        "1",
+        "levels of the direct inverse's surface",
+        "interpolation errs less than the direct method",
     )
     slope_cells_drive: int = setting(
         8,
         "1",
-        "cells of a Duhem operator's slopes along the drive",
-        "smooth maps before the operator",
+        "cells of a Duhem operator's slopes over the drive",
+        "the maps about the operator are smooth",
     )
     slope_cells_state: int = setting(
         12,
         "1",
-        "cells of a Duhem operator's slopes along its state",
-        "twice as fine as a loop needs",
+        "cells of a Duhem operator's slopes over its state",
+        "in trials 10 were too coarse",
     )
     state_margin: float = setting(
         0.1,
-        "range of the state",
-        "by which slopes reach beyond what the start shows",
-        "a start errs",
+        "range of w",
+        "how far the slopes reach beyond the states of the start",
+        "the start errs by a few per cent",
     )
     least_slope: float = setting(
-        0.02, "1", "least slope dA/du of a Duhem operator", "only a growing output has an inverse"
+        0.02,
+        "1",
+        "least slope dA/du of a model",
+        "only an output that grows has an inverse",
     )
     map_terms: int = setting(
-        4, "1", "coefficients of the map behind the plays", "a map of the fifth degree"
+        4,
+        "1",
+        "coefficients of the map behind the plays",
+        "polynomials up to the fifth degree",
+    )
+    density: float = setting(
+        2.0,
+        "1",
+        "standard deviation of the density of plays beforehand",
+        "slopes are of order 1",
     )
     smooth_density: float = setting(
-        3.0, "1", "largest standard deviation of the density's bends", "a density is of order 1"
+        3.0,
+        "1",
+        "greatest standard deviation of the density's bends",
+        "slopes are of order 1",
     )
     rough_density: float = setting(
-        0.3, "1", "largest standard deviation of the density's rough part", "a tenth of it"
+        0.3,
+        "1",
+        "greatest standard deviation of the density's rough part",
+        "a tenth of the density",
     )
     correction: float = setting(
-        0.3, "1", "largest standard deviation of the correction's bends", "a tenth of the density"
+        0.3,
+        "1",
+        "greatest standard deviation of the correction's bends",
+        "a tenth of the density",
     )
     output_map: float = setting(
         0.2,
         "half range",
-        "largest standard deviation of the map's terms",
-        "stages bend by 5 to 10 %",
+        "greatest standard deviation of the map's coefficients",
+        "stages bend by some 5 %",
     )
     slopes: float = setting(
-        5.0, "1", "largest standard deviation of the slopes' bends", "a slope is of order 1"
+        5.0,
+        "1",
+        "greatest standard deviation of the slopes' bends",
+        "slopes are of order 1",
     )
     creep: float = setting(
-        0.3, "1", "largest standard deviation of creep's density", "creep is 1 to 10 % a decade"
+        0.3,
+        "1",
+        "greatest standard deviation of creep's gains",
+        "creep is 1 to 10 % a decade",
     )
     first_scale: float = setting(
-        0.1, "1", "share of these at which the search for the most evident begins", "a decade below"
+        0.1,
+        "1",
+        "share of the greatest values at which their search begins",
+        "a decade below",
     )
     lag_weight: float = setting(
         0.1,
         "static gain",
-        "standard deviation of each fast lag's weight",
-        "lags are small corrections",
+        "standard deviation of the weight of a fast lag",
+        "lags correct modes",
     )
-    creep_per_decade: int = setting(
-        4, "1/decade", "time constants of creep", "10 in all leave gain errors of 1 to 2 %, 16 none"
+    fast_lags: int = setting(
+        6,
+        "1",
+        "fast lags, evenly spaced in the logarithm",
+        "one lag leaves 0.3 % at 0.1 to 2 kHz",
     )
     slowest_lag: float = setting(
         3.0,
         "1/omega",
-        "slowest fast lag, omega the first mode's",
-        "a mode says nothing far below it",
+        "slowest fast lag; omega is the first mode's angular frequency",
+        "slower lags are creep",
     )
     fastest_creep: float = setting(
-        50.0, "1/omega", "fastest time constant of creep", "ten times slower than the lags"
+        50.0,
+        "1/omega",
+        "fastest time constant of creep",
+        "a decade above the lags",
     )
-    fast_lags: int = setting(
-        6, "1", "fast lags", "with one, errors at 0.1 to 2 kHz bend the hysteresis"
+    creep_per_decade: int = setting(
+        4,
+        "1",
+        "time constants of creep in a decade",
+        "half as many leave gain errors of 1 to 2 %",
     )
     damping: float = setting(
-        0.02, "1", "damping of a mode beforehand", "piezo stages: 0.003 to 0.1"
+        0.02,
+        "1",
+        "damping of a mode beforehand",
+        "piezo stages have 0.003 to 0.1",
     )
     heaviest_mode: float = setting(
         3.0,
         "static gain",
-        "largest weight of a mode",
-        "modes that cancel explain nothing",
+        "greatest weight of a mode",
+        "modes that cancel each other explain nothing",
     )
     mode_chance: float = setting(
-        20.0, "nat", "least gain of likelihood by a mode", "4 parameters at one of 10^4 places"
+        20.0,
+        "nat",
+        "least gain in likelihood for a mode",
+        "four parameters at one of some 1000 frequencies",
     )
     mode_share: float = setting(
-        0.05, "misfit", "least share of the misfit that a mode explains", "less is model error"
+        0.05,
+        "1",
+        "least share of the misfit that a mode explains",
+        "seen on scanners made for tests: no derivation",
     )
     dominant_share: float = setting(
         0.5,
-        "misfit",
-        "share from which a mode is taken before the hysteresis",
-        "it hides the loops",
+        "1",
+        "share from which a mode precedes the hysteresis",
+        "it then hides the loops",
     )
-    most_modes: int = setting(4, "1", "modes at most", "further ones told little")
-    trial_steps: int = setting(
-        4, "1", "steps before the operators are compared", "errors differ tenfold"
+    most_modes: int = setting(
+        4,
+        "1",
+        "modes at most",
+        "each costs a fit, and stages show one to three",
     )
-    most_steps: int = setting(25, "1", "steps at most", "three times what converging fits need")
+    stage_steps: int = setting(
+        4,
+        "1",
+        "steps of each stage before the last",
+        "a stage only has to start the next",
+    )
+    most_steps: int = setting(
+        25,
+        "1",
+        "steps of the last stage at most",
+        "fits that converge need 12 to 15",
+    )
     converged: float = setting(
-        1.0, "nat", "gain below which a fit has converged", "a standard error"
+        1.0,
+        "nat",
+        "gain of a step below which a fit has converged",
+        "a move by about one standard error",
     )
     tone_chance: float = setting(
-        1e-3, "1", "probability that noise passes for a tone in a record", "a record in a thousand"
+        1e-3,
+        "1",
+        "probability that noise alone shows a tone in a record",
+        "one record in a thousand",
     )
-    tone_most: int = setting(8, "1", "tones at most in a record", "mains with its harmonics")
+    tone_most: int = setting(
+        8,
+        "1",
+        "tones in a record at most",
+        "mains with its harmonics",
+    )
     tone_cycles: float = setting(
-        10.0, "1", "cycles in a record below which a tone counts as drift", "ten side lobes away"
+        10.0,
+        "1",
+        "cycles in a record below which a sine counts as drift",
+        "the window leaks over a few bins",
     )
     bend: float = setting(
         2e-4,
-        "drive",
-        "distance of the drive from lines between means of blocks",
-        "a small play's width",
+        "1",
+        "rms distance of the drive from lines between block means, over its rms",
+        "a fifth of the smallest play",
     )
     lost: float = setting(
         0.1,
-        "noise variance",
-        "what blocks may lose of a displacement",
+        "1",
+        "what averaging over blocks may remove, over the noise's variance",
         "a tenth of the information",
     )
-    fewest_blocks: int = setting(200, "1", "blocks of a record at least", "more than parameters")
+    fewest_blocks: int = setting(
+        200,
+        "1",
+        "blocks of a record at least",
+        "a record has hundreds of parameters",
+    )
 
 
 DEFAULT_SETTINGS = FitSettings()

@@ -59,11 +59,12 @@ class Signals:
         return np.asarray(self.length * (np.arange(self.blocks)[self.used] + 0.5))
 
     def regressors(self, time_constants: Array, creep: float) -> Array:
-        """What is free in a record of its own, for weights of standard deviation 1 but the first.
+        """What a record holds beside the model, as regressors (m), shape (blocks, regressors).
 
-        Its offset; what still creeps (time constants in s, by a share ``creep`` of the motion)
-        where it began in motion; and its tones, whose amplitudes may change along the record.
-        Shape (blocks, regressors), m.
+        They are its offset; where it began in motion, creep that goes on from before (time
+        constants in s); and its tones, whose amplitudes may change along the record. The weight of
+        the offset is free, the others have a standard deviation of 1: creep is then of a share
+        ``creep`` of the motion.
         """
         seconds = self.seconds[:, np.newaxis]
         columns: list[Array] = [np.ones_like(seconds)]

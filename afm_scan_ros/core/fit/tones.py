@@ -47,7 +47,7 @@ def _over_mean(power: Array) -> Array:
 
 
 def _narrow(power: Array, line: int) -> bool:
-    """Whether a line has fallen off where Hann's window has: from the fourth bin on by 30 dB."""
+    """Whether a line has fallen by 13 dB from the fourth bin on, where Hann's window has by 30."""
     sides = np.concatenate([power[max(line - 8, 1) : max(line - 3, 1)], power[line + 4 : line + 9]])
     return bool(power[line] > 20.0 * sides.max(initial=0.0))
 

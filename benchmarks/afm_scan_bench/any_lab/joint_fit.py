@@ -15,7 +15,8 @@ import afm_scan_ros as afm
 from afm_scan_bench.any_lab.protocols import PROTOCOLS, raised, taken
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.axis import fit_axis, model_of
+from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table

@@ -10,9 +10,10 @@ from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.fit.axis import fit_axis, model_of, with_one_state
+from afm_scan_ros.core.fit.axis import fit_axis, with_one_state
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.evidence import evidence, first_scales
+from afm_scan_ros.core.fit.model_of_fit import from_rest, model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
@@ -149,15 +150,29 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int) -> 
 def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     rng = np.random.default_rng(5)
     bank = PlayBank(-LIMIT, LIMIT)
-    theta = bank.unbent() * 0.8
-    theta[1:88] = 0.3 * rng.random(87)
-    theta[88:] = 0.02 * rng.standard_normal(len(theta) - 88)
+    plays, terms = bank.parts["density"], bank.parts["correction"]
+    density = np.concatenate([[0.8], 0.3 * rng.random(plays - 1)])
+    theta = np.concatenate([density, 0.02 * rng.standard_normal(terms)])
     surface = bank.surface(theta)
     model = Preisach(surface)
     of_model = model.apply(model.at_rest(), drive)[1]
     of_plays = bank.output(theta, drive, rested=True)
     apart = of_model - (of_plays - bank.output(theta, np.zeros(1), rested=True))
     assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 5.0), (-1.0, 4.0), (-3.0, 3.0)])
+def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float) -> None:
+    """Also where plays move once from rest and never again: what they moved by is an offset."""
+    bank = PlayBank(low, high)
+    theta = bank.unbent()
+    theta[: bank.parts["density"]] = np.linspace(0.9, 0.3, bank.parts["density"])
+    surface, _ = from_rest(bank.surface(theta), None)
+    model = Preisach(surface)
+    assert model.at_rest().now[1] == pytest.approx(0.0, abs=1e-12)
+    path = np.interp(np.arange(700), np.arange(0, 701, 100), [0, high, low, high, 1, 3, 0.5, 2])
+    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, rested=True)
+    assert np.ptp(apart[200:]) < 1e-3 * (high - low)
 
 
 def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
@@ -170,7 +185,7 @@ def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
     theta[layout.parts["creep"]] = 0.02
     one = signals(drive, GAIN * drive, 1)
     fit = AxisFit(layout, [one], GAIN, theta)
-    (simulation,) = fit.simulated()
+    (simulation,) = fit.simulated(fit.theta)
     cascade = forward(model_of(fit), PERIOD)
     of_model = cascade.apply(cascade.at_rest(), drive)[1]
     apart = of_model - GAIN * simulation.response.output

@@ -13,6 +13,7 @@ from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.model_of_fit import direct_of
 from afm_scan_ros.core.identification.agreement import refuse_inconsistent, refuse_other_gain
 from afm_scan_ros.core.identification.alternating import AxisRecord, response_to
 from afm_scan_ros.core.identification.creep.fit import CreepFit, fit_creep
@@ -255,7 +256,7 @@ def hysteresis_of(
     gain = _gain(joint)
     forward = _from_rest(surface_of(joint.weights, joint.grid, 0.0), gain)
     vibration = joint.dynamics.vibration if waves is None else waves.model
-    return HysteresisModel(forward, _direct(forward)), _scaled(vibration, gain)
+    return HysteresisModel(forward, direct_of(forward, None, LEVELS)), _scaled(vibration, gain)
 
 
 def _are_slow_curves(moving: Sequence[AnyRecord], joint: JointFit) -> bool:
@@ -279,7 +280,7 @@ def _of_curves(slow: AxisRecord, gain: float, levels: int) -> HysteresisModel:
     drive, reached = slow.drive[:-1], slow.displacement[1:]
     fitted = fit_forward(drive, reached, reversal_curves(drive), levels).surface
     forward = _from_rest(fitted, gain)
-    return HysteresisModel(forward, _direct(forward))
+    return HysteresisModel(forward, direct_of(forward, None, LEVELS))
 
 
 def _gain(joint: JointFit) -> float:
@@ -291,18 +292,6 @@ def _from_rest(surface: EverettSurface, gain: float) -> EverettSurface:
     """Surface in m, over a gain (m/V): F in V, 0 at rest."""
     raw = evolve(surface, values=surface.values / gain)
     return evolve(raw, offset=-float(Preisach(raw).at_rest().now[1]))
-
-
-def _direct(forward: EverettSurface) -> EverettSurface:
-    """Return the inverse's surface (Croft, Shed and Devasia 2001, Eq. 16), from the forward one."""
-    model = Preisach(forward)
-    levels = np.linspace(forward.output_lower, forward.output_upper, LEVELS)
-    values = np.zeros((LEVELS, LEVELS))
-    for row in range(1, LEVELS):
-        there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
-        drive = model.invert(model.saturated(), there_and_back)[1]
-        values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
-    return EverettSurface(forward.output_lower, forward.output_upper, values, forward.lower)
 
 
 def _straight(records: Sequence[AnyRecord]) -> EverettSurface:

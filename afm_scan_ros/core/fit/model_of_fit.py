@@ -1,0 +1,83 @@
+"""The model that a fit has found: the effects of an axis with their direct inverse."""
+
+import numpy as np
+from attrs import evolve
+from scipy.optimize import nnls
+
+from afm_scan_ros.core.effects.base import Cascade
+from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.plays import Plays
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.model import AxisModel, HysteresisModel
+
+
+def model_of(fit: AxisFit) -> AxisModel:
+    """Return the model that a fit has found, with F = 0 at depolarised rest.
+
+    Raises InputError where the operator found does not grow everywhere, so that it has no inverse.
+    """
+    dynamics = fit.layout.dynamics(fit.theta)
+    return AxisModel(_hysteresis(fit), dynamics.vibration(fit.gain), dynamics.creep())
+
+
+def _hysteresis(fit: AxisFit) -> HysteresisModel:
+    layout, theta = fit.layout, fit.layout.of_operator(fit.theta)
+    levels = layout.settings.direct_levels
+    if isinstance(layout.operator, Plays):
+        surface, mapped = from_rest(layout.operator.surface(theta), layout.map_of(fit.theta))
+        return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
+    slopes = layout.operator.slopes(theta)
+    nearest = nearest_surface(slopes, layout.settings)
+    return HysteresisModel(slopes, direct_of(nearest, None, levels))
+
+
+def from_rest(
+    surface: EverettSurface, mapped: OutputMap | None
+) -> tuple[EverettSurface, OutputMap | None]:
+    """Return a surface and the map behind it moved so that F = 0 at the model's own rest."""
+    rest = float(Preisach(surface).at_rest().now[1])
+    if mapped is None:
+        return evolve(surface, offset=surface.offset - rest), None
+    shift = float(mapped.output(np.array([rest]))[0])
+    mapped = evolve(mapped, lower=mapped.lower - shift, upper=mapped.upper - shift)
+    return evolve(surface, offset=surface.offset - shift), mapped
+
+
+def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> EverettSurface:
+    """Return the direct inverse's surface of ``count`` levels, from the exact inverse.
+
+    U(alpha, beta) is half of what the drive falls by as F falls from alpha to beta, after it has
+    risen from the least F. Croft, Shed and Devasia (2001), Eq. 16, from F to u.
+    """
+    behind = () if mapped is None else (mapped,)
+    whole = Cascade((Preisach(surface), *behind))
+    ends = np.array([surface.upper, surface.lower])
+    saturated, (_, low) = whole.apply(whole.at_rest(), ends)
+    high = whole.apply(saturated, ends[:1])[1][0]
+    levels = np.linspace(low, high, count)
+    values = np.zeros((count, count))
+    for row in range(1, count):
+        there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
+        drive = whole.invert(saturated, there_and_back)[1]
+        values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
+    return EverettSurface(float(low), float(high), values, surface.lower)
+
+
+def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurface:
+    """Return the surface of plays that follow the reversal curves of one state best."""
+    turns = np.linspace(slopes.upper, slopes.lower, settings.direct_levels)[1:]
+    ends = np.full_like(turns, slopes.upper)
+    corners = np.concatenate([[0.0], ends[:1], np.column_stack([turns, ends]).ravel()])
+    places = np.arange(len(corners)) * settings.direct_levels
+    drive = np.interp(np.arange(places[-1] + 1), places, corners)
+    model, plays = Duhem(slopes), Plays(slopes.lower, slopes.upper, settings)
+    output = model.apply(model.at_rest(), drive)[1]
+    columns = plays.columns(plays.unbent(), drive, 1, rested=True)[:, : len(plays.thresholds)]
+    density, _ = nnls((columns - columns.mean(axis=0)).astype(float), output - output.mean())
+    theta = np.zeros_like(plays.unbent())
+    theta[: len(density)] = density
+    theta[0] = max(theta[0], settings.least_slope)
+    return plays.surface(theta)
