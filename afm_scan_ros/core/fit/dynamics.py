@@ -139,52 +139,52 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
     return output, states, changes, late
 
 
-def filtered(
-    columns: Array,
-    poles: Complex,
-    weights: Complex,
-    direct: float,
-    length: float,
-    block: int,
-    settled: Array,
-) -> Array:
-    """Columns held over blocks of ``length`` (s) through a bank of poles, as means over blocks.
+class HeldFilter:
+    """A bank of poles for columns held over blocks, piece by piece; gives means over blocks.
 
-    Before the first block each had settled at its value in ``settled``.
+    Before the first block of ``length`` (s) each column had settled at its value in ``settled``.
     """
-    z = np.exp(poles * length)
-    mean = np.expm1(poles * length) / (block * np.expm1(poles * length / block))
-    order = np.argsort(poles.imag == 0.0, kind="stable")
-    n = int(np.count_nonzero(poles.imag))
-    return _filtered(columns, z[order], mean[order], weights[order], n, direct, settled)
+
+    def __init__(
+        self,
+        bank: tuple[Complex, Complex],
+        direct: float,
+        length: float,
+        block: int,
+        settled: Array,
+    ) -> None:
+        order = np.argsort(bank[0].imag == 0.0, kind="stable")
+        poles, weights = (each[order] for each in bank)
+        self._modes = int(np.count_nonzero(poles.imag))
+        self._z = np.exp(poles * length)
+        mean = np.expm1(poles * length) / (block * np.expm1(poles * length / block))
+        self._takes = mean * weights
+        self._through = direct + float(np.sum((1.0 - mean) * weights).real)
+        self._states = np.zeros((2, len(poles), len(settled)))
+        self._states[0] = settled
+
+    def __call__(self, columns: Array) -> Array:
+        """Means of the output for the next piece, both (blocks, columns)."""
+        return _filtered(columns, self._z, self._takes, self._modes, self._through, *self._states)
 
 
 @compiled
 def _filtered(
     columns: Array,
     z: Complex,
-    mean: Complex,
-    weights: Complex,
+    takes: Complex,
     modes: int,
-    direct: float,
-    settled: Array,
+    through: float,
+    real: Array,
+    imag: Array,
 ) -> Array:
     blocks, many = columns.shape
     result = np.empty((blocks, many))
-    real, imag = np.zeros((z.size, many)), np.zeros((z.size, many))
-    for i in range(z.size):
-        for c in range(many):
-            real[i, c] = settled[c]
-    through = direct
-    for i in range(z.size):
-        rest = (1.0 - mean[i]) * weights[i]
-        through += rest.real
     for b in range(blocks):
         for c in range(many):
             result[b, c] = through * columns[b, c]
         for i in range(modes):
-            take = mean[i] * weights[i]
-            tr, ti, zr, zi = take.real, take.imag, z[i].real, z[i].imag
+            tr, ti, zr, zi = takes[i].real, takes[i].imag, z[i].real, z[i].imag
             for c in range(many):
                 v = columns[b, c]
                 xr, xi = real[i, c], imag[i, c]
@@ -193,7 +193,7 @@ def _filtered(
                 real[i, c] = v + zr * xr - zi * xi
                 imag[i, c] = zr * xi + zi * xr
         for i in range(modes, z.size):
-            tr, zr = mean[i].real * weights[i].real, z[i].real
+            tr, zr = takes[i].real, z[i].real
             for c in range(many):
                 v, xr = columns[b, c], real[i, c]
                 result[b, c] += tr * xr

@@ -10,7 +10,7 @@ creep from before it) is linear and eliminated. The Jacobian holds inputs over b
 does not: so a step is approximate, and what it leads to is exact.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.evidence import best_scales, first_scales
+from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
 from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, simulate
 from afm_scan_ros.core.fit.signals import Signals, averaged, noise_of
@@ -44,7 +45,8 @@ class AxisFit:
     theta: Array
     discrepancy: float = 1.0
     scales: dict[str, float] = field()
-    _columns: dict[int, Columns] = field(factory=dict)
+    _columns: dict[int, list[Columns]] = field(factory=dict)
+    _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
     def _first(self) -> dict[str, float]:
@@ -55,8 +57,11 @@ class AxisFit:
         return record.noise**2 / record.block + (self.discrepancy * record.motion) ** 2
 
     def simulated(self, theta: Array) -> list[Simulation]:
-        """Simulate all records."""
-        return [simulate(self.layout, theta, record) for record in self.records]
+        """Simulate all records; what was simulated last is kept."""
+        if self._last is None or self._last[0] is not self.layout or self._last[1] is not theta:
+            every = [simulate(self.layout, theta, record) for record in self.records]
+            self._last = self.layout, theta, every
+        return self._last[2]
 
     def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
@@ -96,20 +101,24 @@ class AxisFit:
         simulations = self.simulated(self.theta)
         lefts = self.residuals(simulations)
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
-            columns = self._columns_of(k) if with_operator else None
-            one = jacobian(self.layout, self.theta, record, simulation, columns) * self.gain
+            pieces = self._pieces_of(k) if with_operator else None
             variance = self.variance(record)
             free = _Free(record, self.layout, variance)
-            cross = free.columns.T @ one / variance
-            matrix += one.T @ one / variance - cross.T @ np.linalg.solve(free.matrix, cross)
-            right += one.T @ lefts[k] / variance
+            share = np.zeros((free.columns.shape[1], self.layout.size))
+            for rows, one in jacobian(self.layout, self.theta, record, simulation, pieces):
+                columns = self.gain * one
+                matrix += columns.T @ columns / variance
+                right += columns.T @ lefts[k][rows] / variance
+                share += free.columns[rows].T @ columns / variance
+            matrix -= share.T @ np.linalg.solve(free.matrix, share)
         return matrix, right
 
     def step(self, groups: Sequence[str] = (), *, searching: bool = False) -> float:
         """Take a step of some groups of parameters, or of all; return how far the objective fell.
 
-        Where ``searching``, the scales of the greatest evidence are chosen first. Creep has one
-        sign: a gain that would fall below zero stays there for this step.
+        Where ``searching``, the scales of the greatest evidence are chosen first. Gains of creep
+        are not negative, and an operator's parameters not below its ``lowest``: one that would pass
+        its bound stays there for this step.
         """
         parts = self.layout.parts
         groups = groups or tuple(parts)
@@ -122,16 +131,19 @@ class AxisFit:
             free[parts[name]] = True
         right = right - precision @ (self.theta - mean)
         lowest = np.full(self.layout.size, -np.inf)
-        lowest[parts["creep"]] = -self.theta[parts["creep"]]
+        lowest[: parts["map"].start] = self.layout.operator.lowest
+        lowest[parts["creep"]] = 0.0
+        lowest -= self.theta
         before = self.objective(self.theta)
         for damping in (0.0, 1e-3, 1e-2, 0.1, 1.0):
             damped = matrix + precision
             damped[np.diag_indices_from(damped)] *= 1.0 + damping
             move = _bounded(damped, right, free, lowest)
             for length in (1.0, 0.5, 0.2, 0.05):
-                after = self.objective(self.theta + length * move)
+                theta = self.theta + length * move
+                after = self.objective(theta)
                 if after < before:
-                    self.theta = self.theta + length * move
+                    self.theta = theta
                     return before - after
         return 0.0
 
@@ -139,9 +151,22 @@ class AxisFit:
         """Take steps until the objective falls no more, weighing the records after each."""
         for _ in range(steps):
             fell = self.step(groups, searching=searching)
+            self.cover()
             self.weigh()
             if fell < self.layout.settings.converged:
                 break
+
+    def cover(self) -> None:
+        """Let the tables of an operator reach as far as its states do."""
+        operator = self.layout.operator
+        if isinstance(operator, OneState):
+            pairs = zip(self.records, self.simulated(self.theta), strict=True)
+            states = [simulation.effective - record.drive for record, simulation in pairs]
+            before = self.layout.of_operator(self.theta)
+            wider, theta = operator.covering(before, np.concatenate(states))
+            if wider is not operator:
+                self.layout = evolve(self.layout, operator=wider)
+                self.theta = np.concatenate([theta, self.theta[len(theta) :]])
 
     def weigh(self) -> None:
         """Estimate the noise of records whose blocks are samples, and η, from the residuals."""
@@ -175,15 +200,18 @@ class AxisFit:
         self.layout, self.theta = layout, layout.start()
         self.theta[: len(operator)] = operator
 
-    def _columns_of(self, k: int) -> Columns:
+    def _pieces_of(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept."""
         operator, record = self.layout.operator, self.records[k]
-        if k not in self._columns or not operator.linear:
-            theta = self.layout.of_operator(self.theta)
-            self._columns[k] = operator.columns(
-                theta, record.drive, record.block, rested=record.rested
-            )
-        return self._columns[k]
+        if k in self._columns:
+            return self._columns[k]
+        theta = self.layout.of_operator(self.theta)
+        pieces: Iterable[Columns] = operator.pieces(
+            theta, record.drive, record.block, rested=record.rested
+        )
+        if operator.linear:
+            pieces = self._columns[k] = list(pieces)
+        return pieces
 
 
 class _Free:

@@ -75,8 +75,9 @@ def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurfac
     drive = np.interp(np.arange(places[-1] + 1), places, corners)
     model, plays = Duhem(slopes), Plays(slopes.lower, slopes.upper, settings)
     output = model.apply(model.at_rest(), drive)[1]
-    columns = plays.columns(plays.unbent(), drive, 1, rested=True)[:, : len(plays.thresholds)]
-    density, _ = nnls((columns - columns.mean(axis=0)).astype(float), output - output.mean())
+    pieces = plays.pieces(plays.unbent(), drive, 1, rested=True)
+    columns = np.concatenate([one[:, : len(plays.thresholds)] for one in pieces]).astype(float)
+    density, _ = nnls(columns - columns.mean(axis=0), output - output.mean())
     theta = np.zeros_like(plays.unbent())
     theta[: len(density)] = density
     theta[0] = max(theta[0], settings.least_slope)

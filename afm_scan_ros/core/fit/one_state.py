@@ -7,16 +7,16 @@ coefficients of cubic B-splines on cells of u and of w. Coleman's and Hodgdon's 
 Wen's are of this form, also between memoryless maps, so no map is fitted behind it.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
+from scipy.interpolate import BSpline
 
 from afm_scan_ros.core.effects.hysteresis.branches import by_input, sensitivities
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
-from afm_scan_ros.core.effects.hysteresis.preisach import AT_ONCE
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged
+from afm_scan_ros.core.fit.signals import AT_ONCE, averaged
 from afm_scan_ros.core.types import Array
 
 
@@ -38,6 +38,11 @@ class OneState:
     def half(self) -> float:
         """Half the drive's range, V."""
         return 0.5 * (self.upper - self.lower)
+
+    @property
+    def lowest(self) -> float:
+        """Least dw/du, so that the output grows with the drive and the operator has an inverse."""
+        return self.settings.least_slope - 1.0
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -75,36 +80,65 @@ class OneState:
         line = np.ones(count + 3), np.linspace(self.lower, self.upper, count + 1)
         return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
 
-    def columns(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Array:
-        """∂A/∂theta for the mean drive of each block, shape (blocks, parameters)."""
+    def pieces(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Iterator[Array]:
+        """Yield ∂A/∂theta for the mean drive of blocks, in pieces of shape (blocks, parameters)."""
         path = averaged(drive, block)
-        start = 0.0 if rested else float(drive[0]), 0.0
-        open_end = np.full(len(path), np.nan)
-        return sensitivities(theta.reshape(self.shape), self.cells, start, path, open_end)[1]
+        now, grown = np.array([0.0 if rested else drive[0], 0.0]), self.unbent()
+        tables, open_end = theta.reshape(self.shape), np.full(AT_ONCE, np.nan)
+        for first in range(0, len(path), AT_ONCE):
+            part = path[first : first + AT_ONCE]
+            yield sensitivities(tables, self.cells, now, grown, part, open_end)[1]
 
     def started(self, paths: Iterable[tuple[Array, Array]]) -> list[Array]:
         """Slopes that lead from each sample of drive and A (V) to the next, ever smoother ones.
 
-        Paths that no such operator makes give slopes that lead astray unless they are smooth.
+        Paths that no such operator makes give slopes that lead astray unless they are smooth. So
+        the last have no hysteresis, and none exceeds what is expected of a slope.
         """
         matrix, right = np.zeros((self.parts["slopes"],) * 2), self.unbent()
         for drive, output in paths:
             w = output - drive
             for first in range(0, len(drive) - 1, AT_ONCE):
                 part = slice(first + 1, first + AT_ONCE + 1)
-                start = float(drive[first]), float(w[first])
+                now, grown = np.array([drive[first], w[first]]), self.unbent()
                 flat = self.unbent().reshape(self.shape)
-                jacobian = sensitivities(flat, self.cells, start, drive[part], w[part])[1]
+                jacobian = sensitivities(flat, self.cells, now, grown, drive[part], w[part])[1]
                 matrix += jacobian.T @ jacobian
                 right += jacobian.T @ np.diff(w[first : first + AT_ONCE + 1])
         prior = self.precision("slopes", {"slopes": 0.1 * self.settings.slopes})
         prior *= np.trace(matrix) / np.trace(prior)
-        return [np.linalg.solve(matrix + one * prior, right) for one in np.logspace(-12.0, 0.0, 9)]
+        strengths = np.logspace(-12.0, 0.0, 9)
+        found = [np.linalg.solve(matrix + one * prior, right) for one in strengths]
+        ends = self.lowest, self.settings.slopes
+        return [*(np.clip(one, *ends) for one in found), self.unbent()]
+
+    def covering(self, theta: Array, states: Array) -> tuple["OneState", Array]:
+        """Return the same slopes on cells that reach just beyond all states w (V).
+
+        Beyond its cells a table continues with the values of its edge.
+        """
+        low, high = float(states.min()), float(states.max())
+        margin = self.settings.state_margin * (high - low)
+        inside = self.widths[0] <= low and high <= self.widths[1]
+        if inside and self.widths[1] - self.widths[0] <= high - low + 6.0 * margin:
+            return self, theta
+        other = evolve(self, widths=(low - margin, high + margin))
+        places = np.linspace(*other.widths, 4 * self.settings.slope_cells_state + 1)
+        old, new = (each.across(places) for each in (self, other))
+        moved = theta.reshape(self.shape) @ np.linalg.lstsq(new, old, rcond=None)[0].T
+        return other, np.clip(moved, self.lowest, None).ravel()
+
+    def across(self, states: Array) -> Array:
+        """Values of the splines over w at states (V), (n,), shape (n, splines)."""
+        _, _, low, cell = self.cells
+        count = self.settings.slope_cells_state
+        knots = low + cell * np.arange(-3.0, count + 4.0)
+        inside = np.clip(states, knots[3], knots[count + 3])
+        return np.asarray(BSpline.design_matrix(inside, knots, 3).toarray())
 
     def slopes(self, theta: Array) -> DuhemSlopes:
-        """Return the effect's parameters; slopes that no branch showed grow as the least allows."""
-        least = self.settings.least_slope
-        rising, falling = np.maximum(1.0 + theta.reshape(self.shape), least)
+        """Return the effect's parameters."""
+        rising, falling = 1.0 + theta.reshape(self.shape)
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper
         return DuhemSlopes(*ends, self.lower, 0.0, self.widths, slope, rising, falling)

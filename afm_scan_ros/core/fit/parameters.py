@@ -2,8 +2,9 @@
 
     y = gain · C(V(F)) + regressors of each record,    F: A = F + Σ_j c_j q_j(F),    A = P(u)
 
-with the operator P (``Plays`` or ``OneState``), the coefficients c_j of the map behind it (``OutputMap``), the
-weights κ of the lags and the modes of V, and the gains g of creep C (``PoleBank``).
+with the operator P (``Plays`` or ``OneState``), the coefficients c_j of the map behind it
+(``OutputMap``), the weights κ of the lags and the modes of V, and the gains g of creep C
+(``PoleBank``).
 """
 
 from collections.abc import Mapping

@@ -12,7 +12,7 @@ B-splines b_j of the play's position, whose coefficients c_j(r) are linear betwe
 Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.3 and 2.4.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from scipy.linalg import block_diag
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.signals import AT_ONCE
 from afm_scan_ros.core.types import Array
 
 
@@ -35,6 +36,7 @@ class Plays:
     upper: float = field(converter=float)
     settings: FitSettings = DEFAULT_SETTINGS
     linear = True
+    lowest = -np.inf
 
     @property
     def half(self) -> float:
@@ -140,19 +142,25 @@ class Plays:
         scale = (len(self.positions) - 1) / (self.upper - self.lower)
         return _output(drive, self.thresholds, start, tables, self.lower, scale)
 
-    def columns(self, _: Array, drive: Array, block: int, *, rested: bool) -> NDArray[np.float32]:
-        """∂P/∂theta averaged over blocks of samples, shape (blocks, parameters).
+    def pieces(
+        self, _: Array, drive: Array, block: int, *, rested: bool
+    ) -> Iterator[NDArray[np.float32]]:
+        """Yield ∂P/∂theta averaged over blocks, in pieces of shape (blocks, parameters).
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
         mean = _means(drive, self.thresholds, self.start(drive, rested=rested), block)
+        for first in range(0, len(mean), AT_ONCE):
+            yield self._columns(mean[first : first + AT_ONCE])
+
+    def _columns(self, plays: Array) -> NDArray[np.float32]:
         mixing = self.widths[:, np.newaxis] * self.blend
-        plays = len(self.thresholds)
-        result = np.empty((len(mean), sum(self.parts.values())), np.float32)
-        result[:, :plays] = mean * self.widths
+        count = len(self.thresholds)
+        result = np.empty((len(plays), sum(self.parts.values())), np.float32)
+        result[:, :count] = plays * self.widths
         for j, rise in enumerate(self.rises):
-            along = np.interp(mean, self.positions, rise)
-            result[:, plays + j :: len(self.rises)] = along @ mixing
+            along = np.interp(plays, self.positions, rise)
+            result[:, count + j :: len(self.rises)] = along @ mixing
         return result
 
     def surface(self, theta: Array) -> EverettSurface:

@@ -1,10 +1,12 @@
 """The model of a record: its displacement sample by sample, and ∂displacement/∂θ block by block."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
-from afm_scan_ros.core.fit.dynamics import PoleBank, Response, filtered, respond
+from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, respond
 from afm_scan_ros.core.fit.parameters import Columns, Layout
 from afm_scan_ros.core.fit.signals import Signals, averaged
 from afm_scan_ros.core.types import Array
@@ -38,44 +40,59 @@ def jacobian(
     theta: Array,
     record: Signals,
     simulation: Simulation,
-    columns: Columns | None,
-) -> Array:
-    """∂y/∂θ for a gain of 1, averaged over the blocks that count, shape (blocks, size).
+    pieces: Iterable[Columns] | None,
+) -> Iterator[tuple[slice, Array]]:
+    """Yield ∂y/∂θ for a gain of 1 in pieces, shape (blocks, size), averaged over blocks.
 
-    ``columns`` is ∂A/∂(operator), averaged over all blocks; without it the operator is held.
+    Each comes with the place of its blocks among all that count. ``pieces`` are those of
+    ∂A/∂(operator), averaged over all blocks; without them the operator is held.
     """
     parts, used = layout.parts, record.used
-    result = np.zeros((used.stop - used.start, layout.size))
-    if columns is not None:
-        result[:, : parts["map"].stop] = _of_operator(layout, theta, record, simulation, columns)
-    result[:, parts["lags"].start : parts["modes"].stop] = _of_vibration(
-        layout, theta, record, simulation
-    )
-    result[:, parts["creep"]] = simulation.response.late[used]
-    return result
+    vibration = slice(parts["lags"].start, parts["modes"].stop)
+    moved, late = _of_vibration(layout, theta, record, simulation), simulation.response.late
+    if pieces is None:
+        of_operator = iter([np.zeros((record.blocks, parts["map"].stop))])
+    else:
+        of_operator = _of_operator(layout, theta, record, simulation, pieces)
+    first = 0
+    for one in of_operator:
+        last = first + len(one)
+        if last > used.start:
+            rows = slice(max(first, used.start), last)
+            result = np.empty((last - rows.start, layout.size))
+            result[:, : parts["map"].stop] = one[rows.start - first :]
+            result[:, vibration] = moved[rows]
+            result[:, parts["creep"]] = late[rows]
+            yield slice(rows.start - used.start, last - used.start), result
+        first = last
 
 
 def _of_operator(
-    layout: Layout, theta: Array, record: Signals, simulation: Simulation, columns: Columns
-) -> Array:
+    layout: Layout, theta: Array, record: Signals, simulation: Simulation, pieces: Iterable[Columns]
+) -> Iterator[Array]:
     """Derivatives by the operator and its map, as inputs held over blocks, through V and C.
 
     From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF).
     """
     operator, mapped = layout.operator, layout.map_of(theta)
     effective = averaged(simulation.effective, record.block)
-    inputs = columns.astype(float)
-    if operator.bends:
-        bends = terms(effective, operator.lower, operator.upper, operator.bends)
-        inputs = np.hstack([inputs, -bends])
-    slope = np.ones_like(effective) if mapped is None else mapped.slope(effective)
-    inputs /= slope[:, np.newaxis]
-    settled = inputs[0].copy()
-    if record.rested:
-        rest = operator.columns(layout.of_operator(theta), np.zeros(1), 1, rested=True)[0]
-        settled[: len(rest)] = rest / slope[0]
-    bank = simulation.dynamics.parallel()
-    return filtered(inputs, *bank, 0.0, record.length, record.block, settled)[record.used]
+    bank, first, through = simulation.dynamics.parallel(), 0, None
+    for columns in pieces:
+        part = effective[first : first + len(columns)]
+        inputs, first = columns.astype(float), first + len(columns)
+        if operator.bends:
+            bends = terms(part, operator.lower, operator.upper, operator.bends)
+            inputs = np.hstack([inputs, -bends])
+        if mapped is not None:
+            inputs /= mapped.slope(part)[:, np.newaxis]
+        if through is None:
+            settled = inputs[0].copy()
+            if record.rested:
+                (rest,) = operator.pieces(layout.of_operator(theta), np.zeros(1), 1, rested=True)
+                slope = 1.0 if mapped is None else mapped.slope(part[:1])[0]
+                settled[: rest.shape[1]] = rest[0] / slope
+            through = HeldFilter(bank, 0.0, record.length, record.block, settled)
+        yield through(inputs)
 
 
 def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
@@ -91,12 +108,6 @@ def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Sim
         columns.append(np.column_stack(moved))
         settled.append(np.array([0.0, 0.0, simulation.settled, 0.0]))
     slow = (-1.0 / layout.time_constants).astype(np.complex128)
-    return filtered(
-        np.hstack(columns),
-        slow,
-        dynamics.gains.astype(np.complex128),
-        1.0,
-        record.length,
-        record.block,
-        np.concatenate(settled),
-    )[record.used]
+    bank = slow, dynamics.gains.astype(np.complex128)
+    creep = HeldFilter(bank, 1.0, record.length, record.block, np.concatenate(settled))
+    return creep(np.hstack(columns))

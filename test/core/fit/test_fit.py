@@ -135,8 +135,9 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int) -> 
         if name in layout.parts:
             theta[layout.parts[name]] += size * rng.standard_normal(theta[layout.parts[name]].size)
     theta[layout.parts["creep"]] = 0.02 * rng.random(theta[layout.parts["creep"]].size)
-    columns = operator.columns(layout.of_operator(theta), drive, block, rested=True)
-    found = jacobian(layout, theta, one, simulate(layout, theta, one), columns)
+    pieces = operator.pieces(layout.of_operator(theta), drive, block, rested=True)
+    of_pieces = jacobian(layout, theta, one, simulate(layout, theta, one), pieces)
+    found = np.concatenate([piece for _, piece in of_pieces])
     for place in rng.choice(layout.size, 60, replace=False):
         step = 1e-5 * np.eye(layout.size)[place]
         up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
@@ -220,15 +221,29 @@ def test_one_state_follows_scanners_without_wiping_out(family: str) -> None:
     output = applied(OPERATORS[family], path)
     low, high = (output - path).min(), (output - path).max()
     operator = OneState(-LIMIT, LIMIT, (low - 0.05, high + 0.05))
-    theta = operator.started([(path, output)])[0]
-    missed = operator.output(theta, path, rested=True) - output
-    assert np.std(missed) < 1e-3 * np.ptp(output)
+    starts = operator.started([(path, output)])
+    missed = [np.std(operator.output(one, path, rested=True) - output) for one in starts]
+    assert min(missed) < 2e-3 * np.ptp(output)
+
+
+def test_slopes_stay_the_same_on_cells_that_reach_further() -> None:
+    path = levels(2, 60, 300)
+    output = applied(OPERATORS["duhem"], path)
+    operator = OneState(-LIMIT, LIMIT, (-0.3, 0.3))
+    theta = operator.started([(path, output)])[5]
+    before = operator.output(theta, path, rested=True)
+    wider, moved = operator.covering(theta, np.array([-0.36, 0.4]))
+    apart = wider.output(moved, path, rested=True) - before
+    assert np.std(apart) < 2e-3 * np.ptp(before)
+    assert wider.widths[0] < -0.36
+    assert wider.widths[1] > 0.4
+    assert wider.covering(moved, np.array([-0.36, 0.4]))[0] is wider
 
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("family", OPERATORS)
 def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
-    """A fresh drive is predicted to 0.1 % of its range, whatever the hysteresis."""
+    """These levels do, to 0.1 % of a fresh drive's range; the docs have others."""
     operator = OPERATORS[family]
     fit = fit_axis([record(operator, levels(11, 60, 1500), tone=5e-9)], "x")
     model = model_of(fit)

@@ -197,16 +197,17 @@ def by_output(
 
 @compiled
 def sensitivities(
-    tables: Array, grid: Grid, start: tuple[float, float], path: Array, known: Array
+    tables: Array, grid: Grid, now: Array, grown: Array, path: Array, known: Array
 ) -> tuple[Array, Array]:
     """Values of w along a path of inputs, (n,), and their derivatives by the tables, (n, values).
 
+    ``now`` (input, w) and its derivatives ``grown`` (values,) are moved on.
     Where ``known`` (n,) is a number, the path goes on from it in place of w: the next value is then
     a prediction by one step alone.
     """
     cells, columns = (tables.shape[1] - 3, tables.shape[2] - 3), tables.shape[2]
     jacobian, values = np.empty((path.size, tables.size)), np.empty(path.size)
-    grown, (u, w) = np.zeros(tables.size), start
+    u, w = now
     for k in range(path.size):
         way = 1.0 if path[k] > u else -1.0
         side = 0 if way > 0.0 else 1
@@ -230,4 +231,5 @@ def sensitivities(
         if not np.isnan(known[k]):
             w = known[k]
             grown[:] = 0.0
+    now[0], now[1] = u, w
     return values, jacobian

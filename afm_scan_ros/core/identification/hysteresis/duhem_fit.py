@@ -288,7 +288,9 @@ def _solved(
     tables = np.stack((slopes.rising - centre, slopes.falling - centre))
     heights = slopes.heights(branches.inputs)
     begin, about = _begin(slopes, branches), branches.outputs - heights
-    values, jacobian = sensitivities(tables, slopes.grid, begin, branches.inputs, known - heights)
+    now, grown = np.array(begin), np.zeros(tables.size)
+    path, reached = branches.inputs, known - heights
+    values, jacobian = sensitivities(tables, slopes.grid, now, grown, path, reached)
     weight = np.sqrt(branches.counts[seen] / branches.counts[seen].mean())
     matrix, before = weight[:, np.newaxis] * jacobian[seen], tables + centre
     given = weight * (about - values)[seen] + matrix @ before.ravel()
