@@ -162,10 +162,25 @@ class HeldFilter:
         self._through = direct + float(np.sum((1.0 - mean) * weights).real)
         self._states = np.zeros((2, len(poles), len(settled)))
         self._states[0] = settled
+        self._live = settled != 0.0
 
     def __call__(self, columns: Array) -> Array:
-        """Means of the output for the next piece, both (blocks, columns)."""
-        return _filtered(columns, self._z, self._takes, self._modes, self._through, *self._states)
+        """Means of the output for the next piece, both (blocks, columns).
+
+        A column that has been zero so far costs nothing.
+        """
+        self._live |= columns.any(axis=0)
+        result, states = np.zeros(columns.shape), np.compress(self._live, self._states, axis=2)
+        result[:, self._live] = _filtered(
+            np.compress(self._live, columns, axis=1),
+            self._z,
+            self._takes,
+            self._modes,
+            self._through,
+            *states,
+        )
+        self._states[:, :, self._live] = states
+        return result
 
 
 @compiled

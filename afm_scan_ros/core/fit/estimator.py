@@ -106,10 +106,11 @@ class AxisFit:
             free = _Free(record, self.layout, variance)
             share = np.zeros((free.columns.shape[1], self.layout.size))
             for rows, one in jacobian(self.layout, self.theta, record, simulation, pieces):
-                columns = self.gain * one
-                matrix += columns.T @ columns / variance
-                right += columns.T @ lefts[k][rows] / variance
-                share += free.columns[rows].T @ columns / variance
+                live = np.flatnonzero(one.any(axis=0))
+                columns = self.gain * one[:, live]
+                matrix[np.ix_(live, live)] += columns.T @ columns / variance
+                right[live] += columns.T @ lefts[k][rows] / variance
+                share[:, live] += free.columns[rows].T @ columns / variance
             matrix -= share.T @ np.linalg.solve(free.matrix, share)
         return matrix, right
 

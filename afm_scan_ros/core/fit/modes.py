@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from afm_scan_ros.core.fit.dynamics import PoleBank, respond
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import Mode
 from afm_scan_ros.core.fit.sensitivity import Simulation
@@ -49,21 +49,54 @@ def _explained(
 
     What the mode gets, the vibration so far loses; the gain is free.
     """
-    pole = np.array([omega * (-damping + 1j * np.sqrt(1.0 - damping**2))])
-    lone = PoleBank(pole, np.ones(1, complex), np.zeros(1), np.ones(1))
-    matrix, right = np.zeros((3, 3)), np.zeros(3)
+    pole = omega * (-damping + 1j * np.sqrt(1.0 - damping**2))
+    sums = np.zeros((4, 4))
     for record, simulation, left in zip(fit.records, simulations, lefts, strict=True):
         if omega * record.length > 0.9 * np.pi:
             continue
-        settled = simulation.settled
-        response = respond(lone, record.period, simulation.effective, record.block, settled)
-        state, early = response.states[record.used, 0], simulation.response.output[record.used]
-        columns = fit.gain * np.column_stack([state.real - early, -state.imag, early])
-        columns -= columns.mean(axis=0)
-        matrix += columns.T @ columns / fit.variance(record)
-        right += columns.T @ left / fit.variance(record)
+        z, early = np.exp(pole * record.period), fit.gain * simulation.response.output
+        signals = simulation.effective, early[record.used], left
+        place = record.block, record.used.start, simulation.settled
+        sums += _products(z, fit.gain, *signals, *place) / fit.variance(record)
+    matrix, right = sums[:3, :3], sums[:3, 3]
     ridge = np.finfo(float).eps * np.trace(matrix) + 1e-300
     real, imag, gain = np.linalg.solve(matrix + ridge * np.eye(3), right)
     if np.hypot(real, imag) > fit.layout.settings.heaviest_mode:
         return 0.0, (omega, damping, 0.0, 0.0)
     return float(0.5 * right @ [real, imag, gain]), (omega, damping, float(real), float(imag))
+
+
+@compiled
+def _products(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not objects
+    z: complex,
+    gain: float,
+    inputs: Array,
+    early: Array,
+    left: Array,
+    block: int,
+    first: int,
+    settled: float,
+) -> Array:
+    """Products of deviations from their means, of means over blocks, shape (4, 4).
+
+    They are of a mode's real part without ``early``, its imaginary part, ``early``, and ``left``.
+    """
+    total, products, row = np.zeros(4), np.zeros((4, 4)), np.zeros(4)
+    x = settled + 0j
+    for b in range(first + left.size):
+        mean = 0j
+        for k in range(b * block, (b + 1) * block):
+            mean += x
+            x = inputs[k] + z * (x - inputs[k])
+        if b < first:
+            continue
+        mean *= gain / block
+        row[:] = mean.real - early[b - first], -mean.imag, early[b - first], left[b - first]
+        for i in range(4):
+            total[i] += row[i]
+            for j in range(4):
+                products[i, j] += row[i] * row[j]
+    for i in range(4):
+        for j in range(4):
+            products[i, j] -= total[i] * total[j] / left.size
+    return products
