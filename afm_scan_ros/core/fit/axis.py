@@ -71,11 +71,14 @@ def fit_axis(
     margin = fit.evidence() - other.evidence()
     fit, chosen = (fit, "plays") if margin > 0.0 else (other, "one state")
     progress(f"the hysteresis is of {chosen}, by {abs(margin):.3g} nat")
-    fit.settle(settings.most_steps, searching=True)
-    while fit.layout.modes < settings.most_modes and _add_mode(fit, settings.mode_share):
+    while True:
+        fit.settle(settings.most_steps, searching=True)
+        if fit.find_tones():
+            continue
+        if fit.layout.modes == settings.most_modes or not _add_mode(fit, settings.mode_share):
+            break
         progress("fitting a further mode")
         fit.settle(settings.stage_steps, VIBRATION)
-        fit.settle(settings.most_steps, searching=True)
     return fit
 
 

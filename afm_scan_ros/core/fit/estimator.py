@@ -182,14 +182,16 @@ class AxisFit:
         least = float(np.finfo(np.float32).eps)
         self.discrepancy = max(float(np.sqrt(excess / motion)), least)
 
-    def find_tones(self) -> None:
-        """Let sines in the residuals be free in their records."""
+    def find_tones(self) -> bool:
+        """Let sines in the residuals be free in their records; return whether there are any."""
+        before = [record.tones for record in self.records]
         for k, left in enumerate(self.residuals(self.simulated(self.theta))):
             record = self.records[k]
             drive = averaged(record.drive, record.block)[record.used]
             tones = find_tones(left, drive, record.length, self.layout.settings)
             self.records[k] = evolve(record, tones=(*record.tones, *tones))
         self.weigh()
+        return before != [record.tones for record in self.records]
 
     def add(self, mode: Mode) -> None:
         """Add a mode."""
