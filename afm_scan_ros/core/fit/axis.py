@@ -54,15 +54,18 @@ def fit_axis(
             )
     fit.weigh()
     progress("looking for modes")
-    while fit.layout.modes < settings.most_modes and _add_mode(fit, settings.dominant_share):
-        fit.settle(settings.stage_steps, VIBRATION)
+    if _add_mode(fit, settings.dominant_share):
+        fit.settle(settings.most_steps, VIBRATION)
     progress("fitting the hysteresis by plays")
     by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep")
     fit.settle(settings.stage_steps, by_plays)
-    if fit.layout.modes == 0 and _add_mode(fit, settings.mode_share):
-        fit.settle(settings.stage_steps, VIBRATION)
-        fit.settle(settings.stage_steps, by_plays)
     fit.find_tones()
+    needed = settings.mode_share if fit.layout.modes == 0 else settings.dominant_share
+    while fit.layout.modes < settings.most_modes and _add_mode(fit, needed):
+        fit.settle(settings.most_steps, VIBRATION)
+        fit.settle(settings.stage_steps, by_plays)
+        fit.find_tones()
+        needed = settings.dominant_share
     progress("fitting the hysteresis by one state")
     other = with_one_state(fit)
     for each in (fit, other):
@@ -78,7 +81,7 @@ def fit_axis(
         if fit.layout.modes == settings.most_modes or not _add_mode(fit, settings.mode_share):
             break
         progress("fitting a further mode")
-        fit.settle(settings.stage_steps, VIBRATION)
+        fit.settle(settings.most_steps, VIBRATION)
     return fit
 
 
@@ -110,16 +113,21 @@ def _first(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisF
 
 
 def _add_mode(fit: AxisFit, share: float) -> bool:
-    """Add the mode that explains most, where it explains enough; the first one places the lags."""
-    settings = fit.layout.settings
-    gain, mode = best_mode(fit)
-    if gain < max(settings.mode_chance, share * fit.misfit(fit.theta)):
+    """Add the mode that explains most, where it explains enough; the first one places the lags.
+
+    Before any other parameter, it also says what the gain is.
+    """
+    settings, layout = fit.layout.settings, fit.layout
+    found = best_mode(fit)
+    if found.explained < max(settings.mode_chance, share * fit.misfit(fit.theta)):
         return False
+    if np.array_equal(fit.theta, layout.start()):
+        fit.gain *= found.gain
     if fit.layout.modes == 0:
         longest = max(len(one.drive) * one.period for one in fit.records)
         shortest = min(one.period for one in fit.records)
-        fit.lay_out(layout_of(fit.layout.operator, longest, shortest, settings, mode[0]))
-    fit.add(mode)
+        fit.lay_out(layout_of(fit.layout.operator, longest, shortest, settings, found.mode[0]))
+    fit.add(found.mode)
     return True
 
 

@@ -28,6 +28,12 @@ from afm_scan_ros.core.types import Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
+LEAST_DAMPING = 1e-6
+"""Marquardt's, over the diagonal of the normal equations: it moves a step by less than rounding."""
+GOOD, POOR = 0.75, 0.25
+"""Fall of the objective over that of its quadratic model, from which the damping falls or grows.
+
+Source: R. Fletcher, A modified Marquardt subroutine, AERE R 6799 (1971)."""
 VIBRATION = ("lags", "modes")
 """Groups of parameters of V, which can be fitted while the operator is held."""
 
@@ -46,6 +52,7 @@ class AxisFit:
     discrepancy: float = 1.0
     scales: dict[str, float] = field()
     _columns: dict[int, list[Columns]] = field(factory=dict)
+    _damping: float = LEAST_DAMPING
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
@@ -135,17 +142,20 @@ class AxisFit:
         lowest[: parts["map"].start] = self.layout.operator.lowest
         lowest[parts["creep"]] = 0.0
         lowest -= self.theta
-        before = self.objective(self.theta)
-        for damping in (0.0, 1e-3, 1e-2, 0.1, 1.0):
-            damped = matrix + precision
-            damped[np.diag_indices_from(damped)] *= 1.0 + damping
+        before, whole = self.objective(self.theta), matrix + precision
+        for _ in range(self.layout.settings.most_trials):
+            damped = whole + self._damping * np.diag(np.diag(whole))
             move = _bounded(damped, right, free, lowest)
-            for length in (1.0, 0.5, 0.2, 0.05):
-                theta = self.theta + length * move
-                after = self.objective(theta)
-                if after < before:
-                    self.theta = theta
-                    return before - after
+            theta = self.theta + move
+            fell = before - self.objective(theta)
+            share = fell / float(move @ right - 0.5 * move @ whole @ move + 1e-300)
+            if share > GOOD:
+                self._damping = max(0.1 * self._damping, LEAST_DAMPING)
+            elif share < POOR:
+                self._damping *= 4.0
+            if fell > 0.0:
+                self.theta = theta
+                return fell
         return 0.0
 
     def settle(self, steps: int, groups: Sequence[str] = (), *, searching: bool = False) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from attrs import frozen
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.fit.estimator import AxisFit
@@ -11,8 +12,17 @@ from afm_scan_ros.core.fit.sensitivity import Simulation
 from afm_scan_ros.core.types import Array
 
 
-def best_mode(fit: AxisFit) -> tuple[float, Mode]:
-    """Return by how much the best mode lowers the misfit, and that mode.
+@frozen
+class FoundMode:
+    """A mode, by how much it lowers the misfit, and the static gain with it over that before."""
+
+    explained: float
+    mode: Mode
+    gain: float
+
+
+def best_mode(fit: AxisFit) -> FoundMode:
+    """Return the mode that lowers the misfit most.
 
     The search goes over all frequencies that the records resolve, in steps of a half-power
     bandwidth, and then about the best of them.
@@ -25,16 +35,17 @@ def best_mode(fit: AxisFit) -> tuple[float, Mode]:
     count = 2 + int(np.log(highest / lowest) / (2.0 * damping))
     best = max(
         (_explained(fit, *given, omega, damping) for omega in np.geomspace(lowest, highest, count)),
-        key=lambda found: found[0],
+        key=lambda found: found.explained,
     )
     for _ in range(3):
-        omega, damping, *_ = best[1]
+        omega, damping, *_ = best.mode
         near = [
             (omega * (1.0 + shift * damping), damping * factor)
             for shift in (-1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0)
             for factor in (0.4, 0.7, 1.0, 1.6)
         ]
-        best = max((_explained(fit, *given, *one) for one in near), key=lambda found: found[0])
+        tried = (_explained(fit, *given, *one) for one in near)
+        best = max(tried, key=lambda found: found.explained)
     return best
 
 
@@ -44,11 +55,8 @@ def _explained(
     lefts: Sequence[Array],
     omega: float,
     damping: float,
-) -> tuple[float, Mode]:
-    """Return by how much a mode lowers the misfit, and the mode with its weight κ.
-
-    What the mode gets, the vibration so far loses; the gain is free.
-    """
+) -> FoundMode:
+    """Fit the weight κ of a mode: what it gets, the vibration so far loses. The gain is free."""
     pole = omega * (-damping + 1j * np.sqrt(1.0 - damping**2))
     sums = np.zeros((4, 4))
     for record, simulation, left in zip(fit.records, simulations, lefts, strict=True):
@@ -60,10 +68,12 @@ def _explained(
         sums += _products(z, fit.gain, *signals, *place) / fit.variance(record)
     matrix, right = sums[:3, :3], sums[:3, 3]
     ridge = np.finfo(float).eps * np.trace(matrix) + 1e-300
-    real, imag, gain = np.linalg.solve(matrix + ridge * np.eye(3), right)
-    if np.hypot(real, imag) > fit.layout.settings.heaviest_mode:
-        return 0.0, (omega, damping, 0.0, 0.0)
-    return float(0.5 * right @ [real, imag, gain]), (omega, damping, float(real), float(imag))
+    real, imag, more = found = np.linalg.solve(matrix + ridge * np.eye(3), right)
+    gain = 1.0 + float(more)
+    if np.hypot(real, imag) > fit.layout.settings.heaviest_mode * abs(gain):
+        return FoundMode(0.0, (omega, damping, 0.0, 0.0), 1.0)
+    mode = omega, damping, float(real) / gain, float(imag) / gain
+    return FoundMode(float(0.5 * right @ found), mode, gain)
 
 
 @compiled

@@ -207,6 +207,12 @@ class FitSettings:
         "steps of the last stage at most",
         "fits that converge need 12 to 15",
     )
+    most_trials: int = setting(
+        12,
+        "1",
+        "dampings tried for a step at most",
+        "each is four times the last",
+    )
     converged: float = setting(
         1.0,
         "nat",

@@ -1,0 +1,66 @@
+"""How well a fit knows its parameters, and what it predicts.
+
+Near the most probable θ the posterior is normal, with the covariance (H + Λ)⁻¹ of the normal
+equations' H and the prior's precision Λ. What no record tells keeps the prior's width.
+"""
+
+from functools import partial
+
+import numpy as np
+from attrs import frozen
+from scipy.linalg import cho_factor, cho_solve
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Prediction:
+    """Displacement from depolarised rest and its standard deviation, both (n,) and in m.
+
+    ``standard_deviation`` holds that of the parameters and the discrepancy η of the fit, but not
+    the sensor's noise.
+    """
+
+    displacement: Array
+    standard_deviation: Array
+
+
+def covariance(fit: AxisFit) -> Array:
+    """Covariance of θ, shape (size, size)."""
+    precision, _ = fit.layout.prior(fit.scales, fit.theta)
+    matrix, _ = fit.normal(with_operator=True)
+    factor = cho_factor(matrix + precision)
+    return np.asarray(cho_solve(factor, np.eye(len(matrix))))
+
+
+def predicted(fit: AxisFit, drive: Array, period: float) -> Prediction:
+    """Predict the displacement under a drive (V), (n,), that begins at 0 V at depolarised rest.
+
+    Raises InputError where the drive begins elsewhere, or leaves the range of the records.
+    """
+    operator, count = fit.layout.operator, len(drive)
+    if drive[0] != 0.0:
+        raise InputError(f"the drive begins at {drive[0]:.4g} V: let it begin at rest, at 0 V")
+    if drive.min() < operator.lower or drive.max() > operator.upper:
+        raise InputError(
+            f"the drive reaches {drive.min():.4g} to {drive.max():.4g} V, but the records only"
+            f" {operator.lower:.4g} to {operator.upper:.4g} V"
+        )
+    record = Signals("prediction", drive, np.zeros(count), period, 1, 0, rested=True, noise=0.0)
+    simulation = simulate(fit.layout, fit.theta, record)
+    moved = fit.gain * (simulation.response.output - simulation.response.output[0])
+    theta = fit.layout.of_operator(fit.theta)
+    pieces = operator.pieces(theta, drive, 1, rested=True)
+    variance, rest = np.empty(count), None
+    spread = partial(np.einsum, "ij,jk,ik->i", optimize=True)
+    known = covariance(fit)
+    for rows, piece in jacobian(fit.layout, fit.theta, record, simulation, pieces):
+        rest = piece[0].copy() if rest is None else rest
+        change = fit.gain * (piece - rest)
+        variance[rows] = spread(change, known, change)
+    discrepancy = fit.discrepancy * float(np.std(moved))
+    return Prediction(moved, np.sqrt(variance + discrepancy**2))
