@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.estimator import VIBRATION, AxisFit
 from afm_scan_ros.core.fit.modes import best_mode
 from afm_scan_ros.core.fit.one_state import OneState
@@ -45,6 +45,8 @@ def fit_axis(
     ------
     InputError
         Where no record moves, and for a record whose memory is never known.
+    ScanError
+        Where the fit diverges.
     """
     fit = _first(records, axis, settings)
     for record in fit.records:
@@ -66,14 +68,10 @@ def fit_axis(
         fit.settle(settings.stage_steps, by_plays)
         fit.find_tones()
         needed = settings.dominant_share
+    fit.settle(settings.stage_steps)
+    fit.find_tones()
     progress("fitting the hysteresis by one state")
-    other = with_one_state(fit)
-    for each in (fit, other):
-        each.settle(settings.stage_steps)
-        each.settle(settings.stage_steps, searching=True)
-    margin = fit.evidence() - other.evidence()
-    fit, chosen = (fit, "plays") if margin > 0.0 else (other, "one state")
-    progress(f"the hysteresis is of {chosen}, by {abs(margin):.3g} nat")
+    fit = _better(fit, with_one_state(fit), progress)
     while True:
         fit.settle(settings.most_steps, searching=True)
         if fit.find_tones():
@@ -82,7 +80,26 @@ def fit_axis(
             break
         progress("fitting a further mode")
         fit.settle(settings.most_steps, VIBRATION)
+    if fit.remaining > settings.converged:
+        progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
+
+
+def _better(plays: AxisFit, other: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return the fit of the greater evidence; one state that diverges is none of the scanner's."""
+    steps = plays.layout.settings.stage_steps
+    plays.settle(steps)
+    plays.settle(steps, searching=True)
+    try:
+        other.settle(steps)
+        other.settle(steps, searching=True)
+        margin = plays.evidence() - other.evidence()
+    except ScanError as error:
+        progress(f"one state: {error}")
+        return plays
+    found, chosen = (plays, "plays") if margin > 0.0 else (other, "one state")
+    progress(f"the hysteresis is of {chosen}, by {abs(margin):.3g} nat")
+    return found
 
 
 def _first(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:

@@ -17,12 +17,12 @@ import numpy as np
 from attrs import define, evolve, field
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.evidence import best_scales, first_scales
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
 from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, simulate
-from afm_scan_ros.core.fit.signals import Signals, averaged, noise_of
+from afm_scan_ros.core.fit.signals import Signals, noise_of
 from afm_scan_ros.core.fit.tones import find_tones
 from afm_scan_ros.core.types import Array
 
@@ -42,6 +42,8 @@ VIBRATION = ("lags", "modes")
 class AxisFit:
     """A fit under way: θ (``theta``), the ``gain`` (m/V) and η (``discrepancy``, 1).
 
+    ``remaining`` (nat) is by how much the objective would fall if it were quadratic, before the
+    last step.
     ``scales`` are standard deviations of priors. The gain stays as it is, for the operator has one.
     """
 
@@ -51,6 +53,7 @@ class AxisFit:
     theta: Array
     discrepancy: float = 1.0
     scales: dict[str, float] = field()
+    remaining: float = np.inf
     _columns: dict[int, list[Columns]] = field(factory=dict)
     _damping: float = LEAST_DAMPING
     _last: tuple[Layout, Array, list[Simulation]] | None = None
@@ -103,7 +106,17 @@ class AxisFit:
         return float(0.5 * (volume - of_noise) - self.objective(self.theta))
 
     def normal(self, *, with_operator: bool) -> tuple[Array, Array]:
-        """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,)."""
+        """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,).
+
+        Raises ScanError where they overflow.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix, right = self._normal(with_operator=with_operator)
+        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+            raise ScanError("the fit diverged: its operator's response grows without bound")
+        return matrix, right
+
+    def _normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
         simulations = self.simulated(self.theta)
         lefts = self.residuals(simulations)
@@ -143,6 +156,8 @@ class AxisFit:
         lowest[parts["creep"]] = 0.0
         lowest -= self.theta
         before, whole = self.objective(self.theta), matrix + precision
+        newton = _bounded(whole, right, free, lowest)
+        self.remaining = float(newton @ right - 0.5 * newton @ whole @ newton)
         for _ in range(self.layout.settings.most_trials):
             damped = whole + self._damping * np.diag(np.diag(whole))
             move = _bounded(damped, right, free, lowest)
@@ -164,7 +179,7 @@ class AxisFit:
             fell = self.step(groups, searching=searching)
             self.cover()
             self.weigh()
-            if fell < self.layout.settings.converged:
+            if fell == 0.0 or self.remaining < self.layout.settings.converged:
                 break
 
     def cover(self) -> None:
@@ -194,14 +209,15 @@ class AxisFit:
 
     def find_tones(self) -> bool:
         """Let sines in the residuals be free in their records; return whether there are any."""
-        before = [record.tones for record in self.records]
-        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
+        simulations, before = self.simulated(self.theta), [one.tones for one in self.records]
+        for k, left in enumerate(self.residuals(simulations)):
             record = self.records[k]
-            drive = averaged(record.drive, record.block)[record.used]
-            tones = find_tones(left, drive, record.length, self.layout.settings)
-            self.records[k] = evolve(record, tones=(*record.tones, *tones))
+            motion = self.gain * simulations[k].response.output[record.used]
+            tones = find_tones(left, motion, record.length, self.layout.settings)
+            room = self.layout.settings.tone_most - len(record.tones)
+            self.records[k] = evolve(record, tones=(*record.tones, *tones[:room]))
         self.weigh()
-        return before != [record.tones for record in self.records]
+        return before != [one.tones for one in self.records]
 
     def add(self, mode: Mode) -> None:
         """Add a mode."""

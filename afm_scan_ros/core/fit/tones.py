@@ -5,29 +5,37 @@ mean about it exceeds ln(n / chance) with the probability ``chance``.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
 
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
+SIDE, FALLEN = 4, 1e-3
+"""Bins from a line to where Hann's window has fallen to this share of its power (30 dB)."""
 
-def find_tones(residual: Array, drive: Array, period: float, settings: FitSettings) -> list[float]:
-    """Frequencies (Hz) of the sines in a residual (m), (n,), the strongest first.
 
-    A line at which the drive (any unit), (n,), has one of its own is left to the model.
+def find_tones(residual: Array, motion: Array, period: float, settings: FitSettings) -> list[float]:
+    """Frequencies (Hz) of the sines in a residual, the strongest first.
+
+    Both are in m, (n,). A line of the model's ``motion`` that is stronger than the residual's is
+    left to the model, whose error it may be.
     """
     found: list[float] = []
     window = np.hanning(len(residual))
     limit = np.log(len(residual) / settings.tone_chance)
-    driven = _over_mean(_power(drive - drive.mean(), window)) > limit
+    moved = _power(motion - motion.mean(), window)
+    lines = _lines(moved, limit)
     left = residual - residual.mean()
     while len(found) < settings.tone_most:
         power = _power(left, window)
-        ratio = np.where(driven, 0.0, _over_mean(power))
+        ratio = np.where(lines & (power < moved), 0.0, _over_mean(power))
         ratio[: int(settings.tone_cycles)] = 0.0
-        line = int(np.argmax(ratio))
-        if ratio[line] < limit or not _narrow(power, line):
+        peaks = [one for one in find_peaks(power)[0] if ratio[one] > limit and _narrow(power, one)]
+        if not peaks:
             break
+        line = max(peaks, key=lambda peak: float(ratio[peak]))
         frequency = _finest(left, window, line)
         turn = 2.0 * np.pi * frequency * np.arange(len(left))
         pair = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -40,6 +48,16 @@ def _power(signal: Array, window: Array) -> Array:
     return np.abs(np.fft.rfft(window * signal)) ** 2
 
 
+def _lines(power: Array, limit: float) -> NDArray[np.bool_]:
+    """Bins that belong to a line of a signal."""
+    result = np.zeros(len(power), bool)
+    peaks, _ = find_peaks(np.where(_over_mean(power) > limit, power, 0.0))
+    for peak in peaks:
+        near = slice(max(peak - SIDE, 0), peak + SIDE + 1)
+        result[near] |= power[near] > FALLEN * power[peak]
+    return result
+
+
 def _over_mean(power: Array) -> Array:
     """Power over the mean of the hundred bins about it; the median of noise is ln 2 of its mean."""
     mean = median_filter(power, 101, mode="nearest") / np.log(2.0)
@@ -47,8 +65,9 @@ def _over_mean(power: Array) -> Array:
 
 
 def _narrow(power: Array, line: int) -> bool:
-    """Whether a line has fallen by 13 dB from the fourth bin on, where Hann's window has by 30."""
-    sides = np.concatenate([power[max(line - 8, 1) : max(line - 3, 1)], power[line + 4 : line + 9]])
+    """Whether a line has fallen by 13 dB where Hann's window has by 30."""
+    before = power[max(line - 2 * SIDE, 1) : max(line - SIDE + 1, 1)]
+    sides = np.concatenate([before, power[line + SIDE : line + 2 * SIDE + 1]])
     return bool(power[line] > 20.0 * sides.max(initial=0.0))
 
 
