@@ -213,9 +213,12 @@ class AxisFit:
         for k, left in enumerate(self.residuals(simulations)):
             record = self.records[k]
             motion = self.gain * simulations[k].response.output[record.used]
-            tones = find_tones(left, motion, record.length, self.layout.settings)
-            room = self.layout.settings.tone_most - len(record.tones)
-            self.records[k] = evolve(record, tones=(*record.tones, *tones[:room]))
+            found = list(record.tones)
+            for tone in find_tones(left, motion, record.length, self.layout.settings):
+                bins = np.abs(np.subtract(found, tone)) * record.length * len(record.mean)
+                if bins.min(initial=np.inf) > 1.0:  # or else it is what a known one leaves
+                    found.append(tone)
+            self.records[k] = evolve(record, tones=tuple(found))
         self.weigh()
         return before != [one.tones for one in self.records]
 

@@ -12,25 +12,28 @@ from scipy.signal import find_peaks
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
-SIDE, FALLEN = 4, 1e-3
-"""Bins from a line to where Hann's window has fallen to this share of its power (30 dB)."""
+SIDE, FALLEN = 4, 0.05
+"""Bins from a line to where the window has fallen by 30 dB; share of its power that is still it."""
 
 
 def find_tones(residual: Array, motion: Array, period: float, settings: FitSettings) -> list[float]:
     """Frequencies (Hz) of the sines in a residual, the strongest first.
 
     Both are in m, (n,). A line of the model's ``motion`` that is stronger than the residual's is
-    left to the model, whose error it may be.
+    left to the model, whose error it may be, and so is any of what a hysteresis makes of it.
     """
     found: list[float] = []
     window = np.hanning(len(residual))
     limit = np.log(len(residual) / settings.tone_chance)
-    moved = _power(motion - motion.mean(), window)
-    lines = _lines(moved, limit)
+    moved, way = motion - motion.mean(), np.sign(np.gradient(motion))
+    distorted = [_power(one, window) for one in (moved**2, way, way * moved, way * moved**2)]
+    bent = np.any([_lines(power, limit) for power in distorted], axis=0)
+    moving = _power(moved, window)
+    lines = _lines(moving, limit)
     left = residual - residual.mean()
     while len(found) < settings.tone_most:
         power = _power(left, window)
-        ratio = np.where(lines & (power < moved), 0.0, _over_mean(power))
+        ratio = np.where(bent | (lines & (power < moving)), 0.0, _over_mean(power))
         ratio[: int(settings.tone_cycles)] = 0.0
         peaks = [one for one in find_peaks(power)[0] if ratio[one] > limit and _narrow(power, one)]
         if not peaks:

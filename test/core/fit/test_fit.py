@@ -10,17 +10,19 @@ from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.axis import fit_axis, with_one_state
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.evidence import evidence, first_scales
 from afm_scan_ros.core.fit.model_of_fit import from_rest, model_of
+from afm_scan_ros.core.fit.modes import best_mode
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.parameters import Layout, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.signals import Signals, known_from, longest_block, noise_of, signals_of
-from afm_scan_ros.core.fit.tones import find_tones
+from afm_scan_ros.core.fit.uncertainty import covariance, predicted
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
@@ -193,6 +195,64 @@ def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
     assert np.abs(apart).max() < 1e-6 * np.ptp(of_model)
 
 
+def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
+    """Against the spread of the responses of parameters that are drawn from the posterior."""
+    drive = levels(4, 6, 300)
+    noise = np.random.default_rng(5).normal(0.0, 1e-8, len(drive))
+    fit = AxisFit(*_of_plays_alone(drive, GAIN * drive + noise))
+    fit.settle(SETTINGS.most_steps, ("density",))
+    fresh = 0.7 * levels(6, 3, 200)
+    stated = predicted(fit, fresh, PERIOD).standard_deviation
+    one, known = signals(fresh, fresh, 1), covariance(fit)
+    rng, drawn = np.random.default_rng(6), []
+    for theta in rng.multivariate_normal(fit.theta, known, 200):
+        response = simulate(fit.layout, theta, one).response.output
+        drawn.append(fit.gain * (response - response[0]))
+    stated = np.sqrt(stated**2 - (fit.discrepancy * np.std(np.mean(drawn, axis=0))) ** 2)
+    np.testing.assert_allclose(np.std(drawn, axis=0)[100:], stated[100:], rtol=0.3)
+
+
+def _of_plays_alone(drive: Array, moved: Array) -> tuple[Layout, list[Signals], float, Array]:
+    layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS)
+    return layout, [signals(drive, moved, 1)], GAIN, layout.start()
+
+
+def test_a_prediction_begins_at_rest_and_stays_within_the_records_drive() -> None:
+    drive = levels(4, 6, 300)
+    fit = AxisFit(*_of_plays_alone(drive, GAIN * drive))
+    with pytest.raises(InputError, match="begins at 1 V"):
+        predicted(fit, drive + 1.0, PERIOD)
+    with pytest.raises(InputError, match=r"but the records only -3\.6 to 3\.6 V"):
+        predicted(fit, 4.0 * drive, PERIOD)
+
+
+def test_a_fit_that_overflows_says_so() -> None:
+    drive = levels(4, 6, 300)
+    fit = AxisFit(*_of_plays_alone(drive, GAIN * drive))
+    fit.gain = 1e200
+    with pytest.raises(ScanError, match="diverged"):
+        fit.normal(with_operator=True)
+
+
+def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
+    """A straight line through them has another, as the phase turns."""
+    rng = np.random.default_rng(8)
+    lines = np.arange(400, 900)
+    spectrum = np.zeros(10_001, complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    wave = np.tile(np.fft.irfft(spectrum, 20_000), 2)
+    drive = np.concatenate([[0.0], wave / np.abs(wave).max(), [0.0]])
+    moved = displaced(lambda volts: volts, drive)
+    layout, given, _, theta = _of_plays_alone(drive, moved)
+    line = float(drive @ moved / (drive @ drive))
+    fit = AxisFit(layout, given, line, theta)
+    fit.weigh()
+    found = best_mode(fit)
+    assert abs(line / GAIN - 1.0) > 0.5
+    assert line * found.gain == pytest.approx(GAIN * (1.0 + CREEP[0]), rel=0.1)
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+
+
 def test_the_evidence_is_the_marginal_likelihood_of_a_linear_model() -> None:
     """Between two scales of the prior it differs as the normal densities of the data do."""
     rng = np.random.default_rng(2)
@@ -250,9 +310,9 @@ def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
     fresh = 0.9 * levels(23, 12, 1500)
     true = displaced(operator, fresh)
     cascade = forward(model, PERIOD)
-    predicted = cascade.apply(cascade.at_rest(), fresh)[1]
-    assert np.std(predicted - true) < 1e-3 * np.ptp(true)
-    slope = np.polyfit(true, predicted, 1)[0]
+    found = cascade.apply(cascade.at_rest(), fresh)[1]
+    assert np.std(found - true) < 1e-3 * np.ptp(true)
+    slope = np.polyfit(true, found, 1)[0]
     assert abs(slope - 1.0) < 2e-3
     assert isinstance(fit.layout.operator, PlayBank if family == "plays" else OneState)
     assert fit.records[0].tones == pytest.approx([50.02], abs=0.02)
@@ -260,19 +320,11 @@ def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
     assert omega / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=1e-3)
     assert damping == pytest.approx(DAMPING, rel=0.05)
     assert fit.records[0].noise == pytest.approx(0.2e-9, rel=0.1)
-
-
-def test_a_tone_is_found_to_a_fortieth_of_a_bin_and_noise_has_none() -> None:
-    rng = np.random.default_rng(0)
-    seconds = PERIOD * np.arange(20_000)
-    noise = rng.standard_normal(len(seconds))
-    quiet = np.zeros(len(seconds))
-    assert find_tones(noise, quiet, PERIOD, SETTINGS) == []
-    tone = noise + 0.2 * np.sin(2.0 * np.pi * 153.7 * seconds)
-    (found,) = find_tones(tone, quiet, PERIOD, SETTINGS)
-    assert found == pytest.approx(153.7, abs=0.05)
-    driven = np.sin(2.0 * np.pi * 153.7 * seconds)
-    assert find_tones(tone, driven, PERIOD, SETTINGS) == []
+    assert fit.remaining < SETTINGS.converged
+    stated = predicted(fit, fresh, PERIOD)
+    assert np.std(stated.displacement - found) < 3e-4 * np.ptp(true)
+    ratio = np.std(stated.displacement - true) / np.sqrt(np.mean(stated.standard_deviation**2))
+    assert 1.0 / 3.0 < ratio < 3.0
 
 
 def test_noise_is_that_of_third_differences_whatever_moves_slowly() -> None:
@@ -299,13 +351,13 @@ def test_memory_is_known_from_rest_or_from_both_ends() -> None:
 def test_a_record_whose_memory_is_never_known_is_refused_by_name() -> None:
     rise = np.linspace(0.0, 1.0, 1000)
     record = afm.Record(rise, GAIN * rise, PERIOD, name="rise")
-    with pytest.raises(afm.InputError, match="rise: its drive reaches the second of its ends only"):
+    with pytest.raises(InputError, match="rise: its drive reaches the second of its ends only"):
         fit_axis([record], "x")
 
 
 def test_no_record_that_moves_is_refused() -> None:
     still = afm.Record(np.zeros(1000), np.zeros(1000), PERIOD)
-    with pytest.raises(afm.InputError, match="no record moves x: give one whose drive changes"):
+    with pytest.raises(InputError, match="no record moves x: give one whose drive changes"):
         fit_axis([still], "x")
 
 

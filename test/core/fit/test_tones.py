@@ -1,0 +1,54 @@
+"""Sines in residuals: which are found, and which are the model's own."""
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.tones import find_tones
+from afm_scan_ros.core.types import Array
+
+PERIOD = 1e-4
+SETTINGS = FitSettings()
+SECONDS = PERIOD * np.arange(20_000)
+NOISE = np.random.default_rng(0).standard_normal(len(SECONDS))
+QUIET = np.zeros(len(SECONDS))
+
+
+def sine(frequency: float) -> Array:
+    return np.asarray(np.sin(2.0 * np.pi * frequency * SECONDS))
+
+
+def found(residual: Array, motion: Array) -> list[float]:
+    return find_tones(residual, motion, PERIOD, SETTINGS)
+
+
+def test_noise_has_no_tone() -> None:
+    assert found(NOISE, QUIET) == []
+
+
+@pytest.mark.parametrize("frequency", [50.02, 153.7, 1007.3])
+def test_a_tone_is_found_to_a_fortieth_of_a_bin(frequency: float) -> None:
+    (one,) = found(NOISE + sine(frequency), QUIET)
+    assert one == pytest.approx(frequency, abs=0.03)
+
+
+def test_a_line_that_the_motion_has_is_the_models() -> None:
+    assert found(NOISE + 0.2 * sine(153.7), 10.0 * sine(153.7)) == []
+
+
+def test_a_line_stronger_than_the_motions_own_is_not_the_models() -> None:
+    motion = 0.2 * np.random.default_rng(1).standard_normal(len(SECONDS)) + 0.05 * sine(153.7)
+    (one,) = found(NOISE + sine(153.7), motion)
+    assert one == pytest.approx(153.7, abs=0.03)
+    assert found(NOISE + sine(153.7), 100.0 * motion) == []
+
+
+@pytest.mark.parametrize("harmonic", [2, 3, 5])
+def test_what_hysteresis_makes_of_a_motion_is_no_tone(harmonic: int) -> None:
+    assert found(NOISE + 0.2 * sine(harmonic * 40.3), 10.0 * sine(40.3)) == []
+
+
+def test_hum_beside_a_motion_that_decays_is_found() -> None:
+    decaying = 10.0 * (1.0 - SECONDS / SECONDS[-1]) * sine(40.3)
+    (one,) = found(NOISE + sine(49.9), decaying)
+    assert one == pytest.approx(49.9, abs=0.03)
