@@ -214,7 +214,8 @@ class AxisFit:
             record = self.records[k]
             motion = self.gain * simulations[k].response.output[record.used]
             found = list(record.tones)
-            for tone in find_tones(left, motion, record.length, self.layout.settings):
+            given = left, motion, self.discrepancy, record.length
+            for tone in find_tones(*given, self.layout.settings):
                 bins = np.abs(np.subtract(found, tone)) * record.length * len(record.mean)
                 if bins.min(initial=np.inf) > 1.0:  # or else it is what a known one leaves
                     found.append(tone)

@@ -4,6 +4,8 @@ A sine is one line of the residual's spectrum. Of noise alone, the power of one 
 mean about it exceeds ln(n / chance) with the probability ``chance``.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -12,28 +14,34 @@ from scipy.signal import find_peaks
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
+LOUD = 10.0
+"""Power of a line over the mean of an error's that no error of the model has (10 dB)."""
 SIDE, FALLEN = 4, 0.05
 """Bins from a line to where the window has fallen by 30 dB; share of its power that is still it."""
 
 
-def find_tones(residual: Array, motion: Array, period: float, settings: FitSettings) -> list[float]:
+def find_tones(
+    residual: Array, motion: Array, error: float, period: float, settings: FitSettings
+) -> list[float]:
     """Frequencies (Hz) of the sines in a residual, the strongest first.
 
     Both are in m, (n,). A line of the model's ``motion`` that is stronger than the residual's is
-    left to the model, whose error it may be, and so is any of what a hysteresis makes of it.
+    left to the model, whose error it may be. So is a line of what a hysteresis makes of the motion,
+    where an ``error`` of that share of the motion (1) explains it.
     """
     found: list[float] = []
     window = np.hanning(len(residual))
     limit = np.log(len(residual) / settings.tone_chance)
-    moved, way = motion - motion.mean(), np.sign(np.gradient(motion))
-    distorted = [_power(one, window) for one in (moved**2, way, way * moved, way * moved**2)]
-    bent = np.any([_lines(power, limit) for power in distorted], axis=0)
+    moved = motion - motion.mean()
     moving = _power(moved, window)
-    lines = _lines(moving, limit)
+    owned = np.where(_lines(moving, limit), moving, 0.0)
+    for one in _distorted(moved):
+        bent = _power(one, window)
+        owned = np.maximum(owned, np.where(_lines(bent, limit), LOUD * error**2 * bent, 0.0))
     left = residual - residual.mean()
     while len(found) < settings.tone_most:
         power = _power(left, window)
-        ratio = np.where(bent | (lines & (power < moving)), 0.0, _over_mean(power))
+        ratio = np.where(power < owned, 0.0, _over_mean(power))
         ratio[: int(settings.tone_cycles)] = 0.0
         peaks = [one for one in find_peaks(power)[0] if ratio[one] > limit and _narrow(power, one)]
         if not peaks:
@@ -45,6 +53,15 @@ def find_tones(residual: Array, motion: Array, period: float, settings: FitSetti
         left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
         found.append(frequency / period)
     return found
+
+
+def _distorted(motion: Array) -> Iterator[Array]:
+    """Yield what a hysteresis adds to a motion, with the motion's own rms: its turns and bends."""
+    way = np.sign(np.gradient(motion))
+    for one in (motion**2, way, way * motion, way * motion**2):
+        size = float(np.std(one))
+        if size > 0.0:
+            yield (one - one.mean()) * (np.std(motion) / size)
 
 
 def _power(signal: Array, window: Array) -> Array:
