@@ -28,12 +28,6 @@ from afm_scan_ros.core.types import Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
-LEAST_DAMPING = 1e-6
-"""Marquardt's, over the diagonal of the normal equations: it moves a step by less than rounding."""
-GOOD, POOR = 0.75, 0.25
-"""Fall of the objective over that of its quadratic model, from which the damping falls or grows.
-
-Source: R. Fletcher, A modified Marquardt subroutine, AERE R 6799 (1971)."""
 VIBRATION = ("lags", "modes")
 """Groups of parameters of V, which can be fitted while the operator is held."""
 
@@ -55,12 +49,16 @@ class AxisFit:
     scales: dict[str, float] = field()
     remaining: float = np.inf
     _columns: dict[int, list[Columns]] = field(factory=dict)
-    _damping: float = LEAST_DAMPING
+    _damping: float = field()
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
     def _first(self) -> dict[str, float]:
         return first_scales(self.layout.settings)
+
+    @_damping.default
+    def _least(self) -> float:
+        return self.layout.settings.least_damping
 
     def variance(self, record: Signals) -> float:
         """Variance v_k of the mean of a block, m²."""
@@ -156,17 +154,18 @@ class AxisFit:
         lowest[parts["creep"]] = 0.0
         lowest -= self.theta
         before, whole = self.objective(self.theta), matrix + precision
+        settings = self.layout.settings
         newton = _bounded(whole, right, free, lowest)
         self.remaining = float(newton @ right - 0.5 * newton @ whole @ newton)
-        for _ in range(self.layout.settings.most_trials):
+        for _ in range(settings.most_trials):
             damped = whole + self._damping * np.diag(np.diag(whole))
             move = _bounded(damped, right, free, lowest)
             theta = self.theta + move
             fell = before - self.objective(theta)
             share = fell / float(move @ right - 0.5 * move @ whole @ move + 1e-300)
-            if share > GOOD:
-                self._damping = max(0.1 * self._damping, LEAST_DAMPING)
-            elif share < POOR:
+            if share > settings.good_step:
+                self._damping = max(0.1 * self._damping, settings.least_damping)
+            elif share < settings.poor_step:
                 self._damping *= 4.0
             if fell > 0.0:
                 self.theta = theta

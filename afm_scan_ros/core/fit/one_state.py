@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 from afm_scan_ros.core.effects.hysteresis.branches import by_input, sensitivities
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import AT_ONCE, averaged
+from afm_scan_ros.core.fit.signals import averaged
 from afm_scan_ros.core.types import Array
 
 
@@ -84,9 +84,10 @@ class OneState:
         """Yield ∂A/∂theta for the mean drive of blocks, in pieces of shape (blocks, parameters)."""
         path = averaged(drive, block)
         now, grown = np.array([0.0 if rested else drive[0], 0.0]), self.unbent()
-        tables, open_end = theta.reshape(self.shape), np.full(AT_ONCE, np.nan)
-        for first in range(0, len(path), AT_ONCE):
-            part = path[first : first + AT_ONCE]
+        at_once = self.settings.blocks_at_once
+        tables, open_end = theta.reshape(self.shape), np.full(at_once, np.nan)
+        for first in range(0, len(path), at_once):
+            part = path[first : first + at_once]
             yield sensitivities(tables, self.cells, now, grown, part, open_end)[1]
 
     def started(self, paths: Iterable[tuple[Array, Array]]) -> list[Array]:
@@ -96,15 +97,16 @@ class OneState:
         the last have no hysteresis, and none exceeds what is expected of a slope.
         """
         matrix, right = np.zeros((self.parts["slopes"],) * 2), self.unbent()
+        at_once = self.settings.blocks_at_once
         for drive, output in paths:
             w = output - drive
-            for first in range(0, len(drive) - 1, AT_ONCE):
-                part = slice(first + 1, first + AT_ONCE + 1)
+            for first in range(0, len(drive) - 1, at_once):
+                part = slice(first + 1, first + at_once + 1)
                 now, grown = np.array([drive[first], w[first]]), self.unbent()
                 flat = self.unbent().reshape(self.shape)
                 jacobian = sensitivities(flat, self.cells, now, grown, drive[part], w[part])[1]
                 matrix += jacobian.T @ jacobian
-                right += jacobian.T @ np.diff(w[first : first + AT_ONCE + 1])
+                right += jacobian.T @ np.diff(w[first : first + at_once + 1])
         prior = self.precision("slopes", {"slopes": 0.1 * self.settings.slopes})
         prior *= np.trace(matrix) / np.trace(prior)
         strengths = np.logspace(-12.0, 0.0, 9)

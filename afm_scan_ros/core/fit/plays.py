@@ -24,7 +24,6 @@ from scipy.linalg import block_diag
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import AT_ONCE
 from afm_scan_ros.core.types import Array
 
 
@@ -150,8 +149,9 @@ class Plays:
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
         mean = _means(drive, self.thresholds, self.start(drive, rested=rested), block)
-        for first in range(0, len(mean), AT_ONCE):
-            yield self._columns(mean[first : first + AT_ONCE])
+        at_once = self.settings.blocks_at_once
+        for first in range(0, len(mean), at_once):
+            yield self._columns(mean[first : first + at_once])
 
     def _columns(self, plays: Array) -> NDArray[np.float32]:
         mixing = self.widths[:, np.newaxis] * self.blend

@@ -213,6 +213,30 @@ class FitSettings:
         "dampings tried for a step at most",
         "each is four times the last",
     )
+    least_damping: float = setting(
+        1e-6,
+        "1",
+        "least damping of a step, over the diagonal of the normal equations",
+        "it moves a step by less than their rounding",
+    )
+    good_step: float = setting(
+        0.75,
+        "1",
+        "fall of the objective over that of its quadratic model from which damping falls",
+        "Fletcher, AERE R 6799 (1971)",
+    )
+    poor_step: float = setting(
+        0.25,
+        "1",
+        "fall of the objective over that of its quadratic model below which damping grows",
+        "Fletcher, AERE R 6799 (1971)",
+    )
+    blocks_at_once: int = setting(
+        1024,
+        "1",
+        "blocks of which derivatives are made at a time",
+        "a processor's cache holds them",
+    )
     converged: float = setting(
         1.0,
         "nat",
@@ -230,6 +254,24 @@ class FitSettings:
         "1",
         "tones in a record at most",
         "mains with its harmonics",
+    )
+    tone_loud: float = setting(
+        10.0,
+        "1",
+        "power of a line over that of an error of the model's size, above which it is a tone",
+        "10 dB above the mean of an error's lines",
+    )
+    tone_side: int = setting(
+        4,
+        "1",
+        "bins from a line to where it has fallen by 30 dB",
+        "Hann's window",
+    )
+    tone_fallen: float = setting(
+        0.05,
+        "1",
+        "share of a line's power above which a bin near it is that line's",
+        "13 dB, two bins of Hann's window",
     )
     tone_cycles: float = setting(
         10.0,

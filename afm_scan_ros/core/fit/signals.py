@@ -9,9 +9,6 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
-AT_ONCE = 1024
-"""Blocks of which derivatives are made at a time: what a processor's cache holds."""
-
 
 @frozen(eq=False)
 class Signals:

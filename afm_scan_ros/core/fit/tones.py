@@ -14,11 +14,6 @@ from scipy.signal import find_peaks
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.types import Array
 
-LOUD = 10.0
-"""Power of a line over the mean of an error's that no error of the model has (10 dB)."""
-SIDE, FALLEN = 4, 0.05
-"""Bins from a line to where the window has fallen by 30 dB; share of its power that is still it."""
-
 
 def find_tones(
     residual: Array, motion: Array, error: float, period: float, settings: FitSettings
@@ -34,16 +29,17 @@ def find_tones(
     limit = np.log(len(residual) / settings.tone_chance)
     moved = motion - motion.mean()
     moving = _power(moved, window)
-    owned = np.where(_lines(moving, limit), moving, 0.0)
+    owned = np.where(_lines(moving, limit, settings), moving, 0.0)
     for one in _distorted(moved):
-        bent = _power(one, window)
-        owned = np.maximum(owned, np.where(_lines(bent, limit), LOUD * error**2 * bent, 0.0))
+        bent = settings.tone_loud * error**2 * _power(one, window)
+        owned = np.maximum(owned, np.where(_lines(bent, limit, settings), bent, 0.0))
     left = residual - residual.mean()
     while len(found) < settings.tone_most:
         power = _power(left, window)
         ratio = np.where(power < owned, 0.0, _over_mean(power))
         ratio[: int(settings.tone_cycles)] = 0.0
-        peaks = [one for one in find_peaks(power)[0] if ratio[one] > limit and _narrow(power, one)]
+        high = [one for one in find_peaks(power)[0] if ratio[one] > limit]
+        peaks = [one for one in high if _narrow(power, one, settings.tone_side)]
         if not peaks:
             break
         line = max(peaks, key=lambda peak: float(ratio[peak]))
@@ -68,13 +64,13 @@ def _power(signal: Array, window: Array) -> Array:
     return np.abs(np.fft.rfft(window * signal)) ** 2
 
 
-def _lines(power: Array, limit: float) -> NDArray[np.bool_]:
+def _lines(power: Array, limit: float, settings: FitSettings) -> NDArray[np.bool_]:
     """Bins that belong to a line of a signal."""
     result = np.zeros(len(power), bool)
     peaks, _ = find_peaks(np.where(_over_mean(power) > limit, power, 0.0))
     for peak in peaks:
-        near = slice(max(peak - SIDE, 0), peak + SIDE + 1)
-        result[near] |= power[near] > FALLEN * power[peak]
+        near = slice(max(peak - settings.tone_side, 0), peak + settings.tone_side + 1)
+        result[near] |= power[near] > settings.tone_fallen * power[peak]
     return result
 
 
@@ -84,10 +80,10 @@ def _over_mean(power: Array) -> Array:
     return np.asarray(power / np.maximum(mean, np.finfo(float).eps * power.max() + 1e-300))
 
 
-def _narrow(power: Array, line: int) -> bool:
+def _narrow(power: Array, line: int, side: int) -> bool:
     """Whether a line has fallen by 13 dB where Hann's window has by 30."""
-    before = power[max(line - 2 * SIDE, 1) : max(line - SIDE + 1, 1)]
-    sides = np.concatenate([before, power[line + SIDE : line + 2 * SIDE + 1]])
+    before = power[max(line - 2 * side, 1) : max(line - side + 1, 1)]
+    sides = np.concatenate([before, power[line + side : line + 2 * side + 1]])
     return bool(power[line] > 20.0 * sides.max(initial=0.0))
 
 

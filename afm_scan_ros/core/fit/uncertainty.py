@@ -18,7 +18,7 @@ from afm_scan_ros.core.types import Array
 
 
 @frozen(eq=False)
-class Prediction:
+class PredictedMotion:
     """Displacement from depolarised rest and its standard deviation, both (n,) and in m.
 
     ``standard_deviation`` holds that of the parameters and the discrepancy η of the fit, but not
@@ -37,7 +37,7 @@ def covariance(fit: AxisFit) -> Array:
     return np.asarray(cho_solve(factor, np.eye(len(matrix))))
 
 
-def predicted(fit: AxisFit, drive: Array, period: float) -> Prediction:
+def predicted(fit: AxisFit, drive: Array, period: float) -> PredictedMotion:
     """Predict the displacement under a drive (V), (n,), that begins at 0 V at depolarised rest.
 
     Raises InputError where the drive begins elsewhere, or leaves the range of the records.
@@ -63,4 +63,4 @@ def predicted(fit: AxisFit, drive: Array, period: float) -> Prediction:
         change = fit.gain * (piece - rest)
         variance[rows] = spread(change, known, change)
     discrepancy = fit.discrepancy * float(np.std(moved))
-    return Prediction(moved, np.sqrt(variance + discrepancy**2))
+    return PredictedMotion(moved, np.sqrt(variance + discrepancy**2))
