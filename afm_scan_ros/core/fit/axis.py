@@ -87,12 +87,12 @@ def fit_axis(
 
 def _better(plays: AxisFit, other: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit of the greater evidence; one state that diverges is none of the scanner's."""
-    steps = plays.layout.settings.stage_steps
-    plays.settle(steps)
-    plays.settle(steps, searching=True)
+    first, most = plays.layout.settings.stage_steps, plays.layout.settings.most_steps
+    plays.settle(first)
+    plays.settle(most, searching=True)
     try:
-        other.settle(steps)
-        other.settle(steps, searching=True)
+        other.settle(first)
+        other.settle(most, searching=True)
         margin = plays.evidence() - other.evidence()
     except ScanError as error:
         progress(f"one state: {error}")

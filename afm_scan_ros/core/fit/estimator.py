@@ -178,7 +178,7 @@ class AxisFit:
             fell = self.step(groups, searching=searching)
             self.cover()
             self.weigh()
-            if fell == 0.0 or self.remaining < self.layout.settings.converged:
+            if fell == 0.0 or max(fell, self.remaining) < self.layout.settings.converged:
                 break
 
     def cover(self) -> None:
