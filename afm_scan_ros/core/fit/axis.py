@@ -59,17 +59,7 @@ def fit_axis(
     if _add_mode(fit, settings.dominant_share):
         fit.settle(settings.most_steps, VIBRATION)
     progress("fitting the hysteresis by plays")
-    by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep")
-    fit.settle(settings.stage_steps, by_plays)
-    fit.find_tones()
-    needed = settings.mode_share if fit.layout.modes == 0 else settings.dominant_share
-    while fit.layout.modes < settings.most_modes and _add_mode(fit, needed):
-        fit.settle(settings.most_steps, VIBRATION)
-        fit.settle(settings.stage_steps, by_plays)
-        fit.find_tones()
-        needed = settings.dominant_share
-    fit.settle(settings.stage_steps)
-    fit.find_tones()
+    _fit_plays(fit)
     progress("fitting the hysteresis by one state")
     fit = _better(fit, with_one_state(fit), progress)
     while True:
@@ -83,6 +73,22 @@ def fit_axis(
     if fit.remaining > settings.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
+
+
+def _fit_plays(fit: AxisFit) -> None:
+    """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last."""
+    settings = fit.layout.settings
+    by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep")
+    fit.settle(settings.stage_steps, by_plays)
+    fit.find_tones()
+    needed = settings.mode_share if fit.layout.modes == 0 else settings.dominant_share
+    while fit.layout.modes < settings.most_modes and _add_mode(fit, needed):
+        fit.settle(settings.most_steps, VIBRATION)
+        fit.settle(settings.stage_steps, by_plays)
+        fit.find_tones()
+        needed = settings.dominant_share
+    fit.settle(settings.stage_steps)
+    fit.find_tones()
 
 
 def _better(plays: AxisFit, other: AxisFit, progress: ProgressCallback) -> AxisFit:

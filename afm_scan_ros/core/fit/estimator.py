@@ -36,9 +36,9 @@ VIBRATION = ("lags", "modes")
 class AxisFit:
     """A fit under way: θ (``theta``), the ``gain`` (m/V) and η (``discrepancy``, 1).
 
-    ``remaining`` (nat) is by how much the objective would fall if it were quadratic, before the
-    last step.
-    ``scales`` are standard deviations of priors. The gain stays as it is, for the operator has one.
+    ``scales`` are standard deviations of priors. ``remaining`` (nat) is by how much the objective
+    would have fallen in the last step, were it quadratic. The gain stays as the first mode leaves
+    it, for the operator has one.
     """
 
     layout: Layout
@@ -155,11 +155,11 @@ class AxisFit:
         lowest -= self.theta
         before, whole = self.objective(self.theta), matrix + precision
         settings = self.layout.settings
-        newton = _bounded(whole, right, free, lowest)
+        newton = bounded(whole, right, free, lowest)
         self.remaining = float(newton @ right - 0.5 * newton @ whole @ newton)
         for _ in range(settings.most_trials):
             damped = whole + self._damping * np.diag(np.diag(whole))
-            move = _bounded(damped, right, free, lowest)
+            move = bounded(damped, right, free, lowest)
             theta = self.theta + move
             fell = before - self.objective(theta)
             share = fell / float(move @ right - 0.5 * move @ whole @ move + 1e-300)
@@ -178,7 +178,7 @@ class AxisFit:
             fell = self.step(groups, searching=searching)
             self.cover()
             self.weigh()
-            if fell == 0.0 or max(fell, self.remaining) < self.layout.settings.converged:
+            if fell == 0.0 or self.remaining < self.layout.settings.converged:
                 break
 
     def cover(self) -> None:
@@ -207,18 +207,14 @@ class AxisFit:
         self.discrepancy = max(float(np.sqrt(excess / motion)), least)
 
     def find_tones(self) -> bool:
-        """Let sines in the residuals be free in their records; return whether there are any."""
+        """Let sines in the residuals be free in their records; return whether any are new."""
         simulations, before = self.simulated(self.theta), [one.tones for one in self.records]
         for k, left in enumerate(self.residuals(simulations)):
             record = self.records[k]
             motion = self.gain * simulations[k].response.output[record.used]
-            found = list(record.tones)
             given = left, motion, self.discrepancy, record.length
-            for tone in find_tones(*given, self.layout.settings):
-                bins = np.abs(np.subtract(found, tone)) * record.length * len(record.mean)
-                if bins.min(initial=np.inf) > 1.0:  # or else it is what a known one leaves
-                    found.append(tone)
-            self.records[k] = evolve(record, tones=tuple(found))
+            found = find_tones(*given, self.layout.settings)
+            self.records[k] = record.with_tones(found, self.layout.settings.tone_most)
         self.weigh()
         return before != [one.tones for one in self.records]
 
@@ -261,16 +257,23 @@ class _Free:
         return np.asarray(signal - self.columns @ np.linalg.solve(self.matrix, right))
 
 
-def _bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
-    """Solve for the move of free parameters; those that would pass the lowest are held there."""
-    move, loose = np.zeros(len(right)), free.copy()
-    for _ in range(len(right)):
+def bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
+    """Move of the free parameters, none below its lowest, that lowers ½ mᵀHm - gᵀm most.
+
+    All that would pass their bound are held there, and all held that pull away from it are let go,
+    while these become fewer; then one at a time, so that this ends.
+    Source: J. Kim and H. Park, SIAM J. Sci. Comput. 33 (2011) 3261, section 3.
+    """
+    move, loose, fewest = np.zeros(len(right)), free.copy(), len(right) + 1
+    for _ in range(3 * len(right)):
         held = free & ~loose
+        move[held] = lowest[held]
         pull = right[loose] - matrix[np.ix_(loose, held)] @ move[held]
         move[loose] = np.linalg.solve(matrix[np.ix_(loose, loose)], pull)
-        passed = loose & (move < lowest)
-        if not passed.any():
+        wrong = np.flatnonzero((loose & (move < lowest)) | (held & (right - matrix @ move > 0.0)))
+        if len(wrong) == 0:
             break
-        loose &= ~passed
-        move[passed] = lowest[passed]
-    return move
+        exchanged = wrong if len(wrong) < fewest else wrong[-1:]
+        fewest = min(fewest, len(wrong))
+        loose[exchanged] = ~loose[exchanged]
+    return np.where(free, np.maximum(move, lowest), 0.0)

@@ -1,9 +1,10 @@
 """One axis of a record as the fit takes it: blocks of samples, with their noise."""
 
+from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -75,6 +76,15 @@ class Signals:
             pair = self.motion * np.hstack([np.cos(turn), np.sin(turn)])
             columns += [pair, along * pair]
         return np.concatenate(columns, axis=1)
+
+    def with_tones(self, tones: Iterable[float], most: int) -> "Signals":
+        """Add tones (Hz), at most so many in all, but none within a bin of one that is there."""
+        found, bin_width = list(self.tones), 1.0 / (self.length * len(self.mean))
+        for tone in tones:
+            apart = np.abs(np.subtract(found, tone)).min(initial=np.inf)
+            if apart > bin_width and len(found) < most:
+                found.append(tone)
+        return evolve(self, tones=tuple(found))
 
 
 def signals_of(

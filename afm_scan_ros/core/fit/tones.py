@@ -39,7 +39,7 @@ def find_tones(
         ratio = np.where(power < owned, 0.0, _over_mean(power))
         ratio[: int(settings.tone_cycles)] = 0.0
         high = [one for one in find_peaks(power)[0] if ratio[one] > limit]
-        peaks = [one for one in high if _narrow(power, one, settings.tone_side)]
+        peaks = [one for one in high if _narrow(power, one, settings)]
         if not peaks:
             break
         line = max(peaks, key=lambda peak: float(ratio[peak]))
@@ -80,11 +80,12 @@ def _over_mean(power: Array) -> Array:
     return np.asarray(power / np.maximum(mean, np.finfo(float).eps * power.max() + 1e-300))
 
 
-def _narrow(power: Array, line: int, side: int) -> bool:
+def _narrow(power: Array, line: int, settings: FitSettings) -> bool:
     """Whether a line has fallen by 13 dB where Hann's window has by 30."""
+    side = settings.tone_side
     before = power[max(line - 2 * side, 1) : max(line - side + 1, 1)]
     sides = np.concatenate([before, power[line + side : line + 2 * side + 1]])
-    return bool(power[line] > 20.0 * sides.max(initial=0.0))
+    return bool(settings.tone_fallen * power[line] > sides.max(initial=0.0))
 
 
 def _finest(signal: Array, window: Array, line: int) -> float:

@@ -6,13 +6,15 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 from attrs import evolve
-from scipy import signal
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import optimize, signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.axis import fit_axis, with_one_state
-from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.estimator import AxisFit, bounded
 from afm_scan_ros.core.fit.evidence import evidence, first_scales
 from afm_scan_ros.core.fit.model_of_fit import from_rest, model_of
 from afm_scan_ros.core.fit.modes import best_mode
@@ -226,6 +228,18 @@ def test_a_prediction_begins_at_rest_and_stays_within_the_records_drive() -> Non
         predicted(fit, 4.0 * drive, PERIOD)
 
 
+@given(seed=st.integers(0, 10_000), size=st.integers(2, 40))
+def test_a_bounded_move_is_that_of_bounded_least_squares(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns, data = rng.standard_normal((size + 5, size)), rng.standard_normal(size + 5)
+    lowest = np.where(rng.random(size) < 0.7, -0.1 * rng.random(size), -np.inf)
+    free = rng.random(size) < 0.9
+    move = bounded(columns.T @ columns, columns.T @ data, free, lowest)
+    ends = np.where(free, lowest, -1e-12), np.where(free, np.inf, 1e-12)
+    expected = optimize.lsq_linear(columns, data, ends, method="bvls", tol=1e-14).x
+    np.testing.assert_allclose(move, expected, atol=1e-6)
+
+
 def test_a_fit_that_overflows_says_so() -> None:
     drive = levels(4, 6, 300)
     fit = AxisFit(*_of_plays_alone(drive, GAIN * drive))
@@ -300,6 +314,10 @@ def test_slopes_stay_the_same_on_cells_that_reach_further() -> None:
     assert wider.covering(moved, np.array([-0.36, 0.4]))[0] is wider
 
 
+OVERCONFIDENT = {"plays": 3.0, "duhem": 3.0, "bouc_wen": 8.0}
+"""Largest error over its stated standard deviation: the page says that it is too small."""
+
+
 @pytest.mark.evidence
 @pytest.mark.parametrize("family", OPERATORS)
 def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
@@ -323,7 +341,7 @@ def test_a_few_seconds_of_levels_identify_a_scanner(family: str) -> None:
     stated = predicted(fit, fresh, PERIOD)
     assert np.std(stated.displacement - found) < 5e-4 * np.ptp(true)  # levels of the surface
     ratio = np.std(stated.displacement - true) / np.sqrt(np.mean(stated.standard_deviation**2))
-    assert 0.2 < ratio < 5.0
+    assert 0.2 < ratio < OVERCONFIDENT[family]
 
 
 def test_noise_is_that_of_third_differences_whatever_moves_slowly() -> None:
