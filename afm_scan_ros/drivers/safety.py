@@ -48,7 +48,7 @@ class SafetySettings:
     discovery: float = setting(
         7.0,
         "s",
-        "Longest wait for readers of the state of a node that cannot be made",
+        "Longest wait for readers of a last state, or for the announcement of blocks that came",
         "DDS announces a participant every 3 s; twice that, since the first may be lost",
     )
     last_word: float = setting(

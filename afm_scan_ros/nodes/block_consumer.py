@@ -244,10 +244,11 @@ class StreamReader(BlockConsumer):
     def step(self) -> bool:
         """End where blocks came, but no announcement of their scan.
 
-        A player's Fast DDS, whose heartbeats come every 3 s, repeats a lost one no sooner.
+        Its publisher may not be known yet, and a player's Fast DDS, whose heartbeats come every
+        3 s, repeats a lost announcement no sooner.
         """
         waited = time.monotonic() - self._early_since if self._early else 0.0
-        if waited > self.safety.silence_at_rest:
+        if waited > self.safety.discovery:
             self.follow(*self._early[0])  # raises
         return super().step()
 

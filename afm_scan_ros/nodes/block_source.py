@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from math import ceil
 
 from attrs import evolve
+from rclpy.duration import Duration
 
 from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.core.errors import InputError
@@ -31,6 +32,7 @@ class BlockSource(ScanNode):
         self._hindered = time.monotonic()
         self._blocks = Outbox(self.create_publisher(topic.kind, topic.name, topic.writer))
         self._announced = False
+        self._done_since = 0.0
         self._announcement = self.create_publisher(SCAN_INFO.kind, SCAN_INFO.name, SCAN_INFO.writer)
         for own in (SCAN_INFO, topic):
             self.listen_to(own)
@@ -71,10 +73,20 @@ class BlockSource(ScanNode):
             self._begin_when_possible()
         elif self.next_sample < self.total:
             return self._send()
+        elif self.state == DONE:
+            self._leave_when_heard()
         elif self._blocks.flush(time.monotonic()) and not self.peers.lacking(DONE):
+            self._done_since = time.monotonic()
             self.go(DONE, self.reason)
-            self.leave()
+            self._leave_when_heard()
         return False
+
+    def _leave_when_heard(self) -> None:
+        """Leave once each viewer has the announcement, which goes with its publisher."""
+        waited = time.monotonic() - self._done_since
+        heard = self._announcement.wait_for_all_acked(Duration())
+        if heard or waited > self.safety.discovery:
+            self.leave()
 
     def figures(self) -> Mapping[str, object]:
         """Return also the lead over the slowest node, and the delay against the pace."""

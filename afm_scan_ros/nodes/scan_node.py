@@ -376,13 +376,12 @@ class ScanNode(Node, ABC):
 
     def crowded(self) -> str:
         """Return which topic has not the one publisher that it should have, if any."""
-        counts = {name: self.count_publishers(name) for name in self.inputs}
-        wrong = (
-            f"waits for one publisher of {name}, not {count}"
-            for name, count in counts.items()
-            if count != 1
-        )
-        return next(wrong, "")
+        for name in self.inputs:
+            if (count := self.count_publishers(name)) != 1:
+                nodes = sorted(node for node in self._gids(name).values() if node != _UNNAMED)
+                named = f" ({', '.join(nodes)})" if nodes else ""
+                return f"waits for one publisher of {name}, not {count}{named}"
+        return ""
 
     def pin_publishers(self) -> None:
         """Take the publishers that there are now as those of the scan."""

@@ -92,7 +92,7 @@ def test_blocks_wait_for_the_announcement_of_their_scan(player: Node, *, announc
         topics[SCAN_INFO].publish(info_message(info))
         until(lambda: monitor.next_sample == BLOCK, monitor)
     else:
-        time.sleep(monitor.safety.silence_at_rest)
+        time.sleep(monitor.safety.discovery)
         with pytest.raises(ScanError, match="a block came before scan_info"):
             monitor.step()
     monitor.destroy_node()

@@ -30,7 +30,7 @@ from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic
 from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
-from helpers.ros import PATIENCE, joined, publisher
+from helpers.ros import PATIENCE, joined, publisher, until
 
 QUARTER = 1000
 INFO = ScanInfo("tested", 10**18, "creep", 1e-4, 4 * QUARTER, window=4 * QUARTER)
@@ -137,11 +137,21 @@ def one_more(
         context.shutdown()
 
 
+def names(node: ScanNode) -> list[str]:
+    """Return the nodes that publish the desired displacement."""
+    found = node.get_publishers_info_by_topic(DESIRED.name)
+    return sorted(each.node_name for each in found)
+
+
 def test_a_node_is_ready_once_it_counts_one_publisher(begin: Begin) -> None:
-    """That of a process that was killed is counted for a while."""
+    """That of a process that was killed is counted for a while.
+
+    It is found and named before the node looks, or the node is ready too early.
+    """
     with one_more(DESIRED):
         scan = begin(ScanRecorder, DESIRED)
-        said = "waits for one publisher of /desired_displacement, not 2"
+        said = "waits for one publisher of /desired_displacement, not 2 (another, source)"
+        until(lambda: names(scan.node) == ["another", "source"])
         scan.until(lambda: scan.node.reason == said)
         assert not scan.node.ready
     scan.until(lambda: scan.node.ready)
@@ -217,6 +227,7 @@ def test_a_scan_begins_once_each_has_spoken_after_the_last_was_ready(
     """One that was ready may have been killed since, and be on its way back."""
     monkeypatch.setattr(ScanNode, "safety", SafetySettings(doubt=PATIENCE))
     generator = TrajectoryGenerator()
+    until(lambda: not generator.crowded())  # rmw tells even a node's own publishers by and by
 
     def say(name: str) -> str:
         report = Report(name, generator.scan.scan_id, READY, 0, "", time.monotonic())
