@@ -6,8 +6,9 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.estimator import VIBRATION, AxisFit
-from afm_scan_ros.core.fit.modes import best_mode
+from afm_scan_ros.core.fit.descent import VIBRATION, settle
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.modes import FoundMode, best_mode, clear, large
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
@@ -56,21 +57,26 @@ def fit_axis(
             )
     fit.weigh()
     progress("looking for modes")
-    if _add_mode(fit, settings.dominant_share):
-        fit.settle(settings.most_steps, VIBRATION)
+    if found := _first_mode(fit):
+        fit.gain *= found.gain
+        settle(fit, settings.most_steps, VIBRATION)
     progress("fitting the hysteresis by plays")
     _fit_plays(fit)
     progress("fitting the hysteresis by one state")
-    fit = _better(fit, with_one_state(fit), progress)
+    fit = _better(fit, progress)
     while True:
-        fit.settle(settings.most_steps, searching=True)
+        settle(fit, settings.most_steps, searching=True)
         if fit.find_tones():
             continue
-        if fit.layout.modes == settings.most_modes or not _add_mode(fit, settings.mode_share):
+        if not _add_mode(fit):
             break
         progress("fitting a further mode")
-        fit.settle(settings.most_steps, VIBRATION)
-    if fit.remaining > settings.converged:
+        settle(fit, settings.most_steps, VIBRATION)
+    if len(fit.layout.lacking(fit.theta)[1]):
+        progress("holding the surface of the hysteresis to growth")
+        fit.grows = True
+        settle(fit, settings.most_steps)
+    if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
 
@@ -79,33 +85,44 @@ def _fit_plays(fit: AxisFit) -> None:
     """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last."""
     settings = fit.layout.settings
     by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep")
-    fit.settle(settings.stage_steps, by_plays)
+    settle(fit, settings.stage_steps, by_plays)
     fit.find_tones()
-    needed = settings.mode_share if fit.layout.modes == 0 else settings.dominant_share
-    while fit.layout.modes < settings.most_modes and _add_mode(fit, needed):
-        fit.settle(settings.most_steps, VIBRATION)
-        fit.settle(settings.stage_steps, by_plays)
+    while _add_mode(fit):
+        settle(fit, settings.most_steps, VIBRATION)
+        settle(fit, settings.stage_steps, by_plays)
         fit.find_tones()
-        needed = settings.dominant_share
-    fit.settle(settings.stage_steps)
+    settle(fit, settings.stage_steps)
     fit.find_tones()
 
 
-def _better(plays: AxisFit, other: AxisFit, progress: ProgressCallback) -> AxisFit:
+def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit of the greater evidence; one state that diverges is none of the scanner's."""
-    first, most = plays.layout.settings.stage_steps, plays.layout.settings.most_steps
-    plays.settle(first)
-    plays.settle(most, searching=True)
     try:
-        other.settle(first)
-        other.settle(most, searching=True)
-        margin = plays.evidence() - other.evidence()
+        other = with_one_state(plays)
+        margin = _margin(plays, other)
     except ScanError as error:
         progress(f"one state: {error}")
         return plays
-    found, chosen = (plays, "plays") if margin > 0.0 else (other, "one state")
+    better, chosen = (plays, "plays") if margin > 0.0 else (other, "one state")
     progress(f"the hysteresis is of {chosen}, by {abs(margin):.3g} nat")
-    return found
+    return better
+
+
+def _margin(one: AxisFit, other: AxisFit) -> float:
+    """Evidence for one fit over another, nat.
+
+    Both take steps in turn until they converge, or the worse one would hardly make up.
+    """
+    settings, margin = one.layout.settings, 0.0
+    for _ in range(settings.most_steps // settings.stage_steps):
+        for each in (one, other):
+            settle(each, settings.stage_steps, searching=True)
+        margin = one.evidence() - other.evidence()
+        worse = other if margin > 0.0 else one
+        decided = abs(margin) > settings.decided * worse.remaining
+        if decided or (one.converged and other.converged):
+            break
+    return margin
 
 
 def _first(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:
@@ -135,27 +152,40 @@ def _first(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisF
     return AxisFit(layout, signals, gain, layout.start())
 
 
-def _add_mode(fit: AxisFit, share: float) -> bool:
-    """Add the mode that explains most, where it explains enough; the first one places the lags.
+def _first_mode(fit: AxisFit) -> FoundMode | None:
+    """Add the mode of the largest residuals, where they are about it rather than of the loops."""
+    found = best_mode(fit, large)
+    if found is None or found.share < fit.layout.settings.dominant_share:
+        return None
+    _add(fit, found)
+    return found
 
-    Before any other parameter, it also says what the gain is.
-    """
-    settings, layout = fit.layout.settings, fit.layout
-    found = best_mode(fit)
-    if found.explained < max(settings.mode_chance, share * fit.misfit(fit.theta)):
+
+def _add_mode(fit: AxisFit) -> bool:
+    """Add the mode that is seen most clearly, where there is one and room for it."""
+    settings = fit.layout.settings
+    found = best_mode(fit, clear) if fit.layout.modes < settings.most_modes else None
+    if found is None or found.share < settings.mode_share:
         return False
-    if np.array_equal(fit.theta, layout.start()):
-        fit.gain *= found.gain
-    if fit.layout.modes == 0:
-        longest = max(len(one.drive) * one.period for one in fit.records)
-        shortest = min(one.period for one in fit.records)
-        fit.lay_out(layout_of(fit.layout.operator, longest, shortest, settings, found.mode[0]))
-    fit.add(found.mode)
+    _add(fit, found)
     return True
 
 
+def _add(fit: AxisFit, found: FoundMode) -> None:
+    """Add a mode; the first one places the lags."""
+    if fit.layout.modes == 0:
+        longest = max(len(one.drive) * one.period for one in fit.records)
+        shortest = min(one.period for one in fit.records)
+        settings, omega = fit.layout.settings, found.mode[0]
+        fit.lay_out(layout_of(fit.layout.operator, longest, shortest, settings, omega))
+    fit.add(found.mode)
+
+
 def with_one_state(fit: AxisFit) -> AxisFit:
-    """Return the fit with the operator of one state that follows its F best."""
+    """Return the fit with the operator of one state that follows its F best.
+
+    What vibrates is sought anew: it may have taken what plays cannot do.
+    """
     layout, paths = fit.layout, []
     for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
         output = simulation.effective - simulation.settled
@@ -173,5 +203,8 @@ def with_one_state(fit: AxisFit) -> AxisFit:
         evolve(layout, operator=operator), list(fit.records), fit.gain, starts[0], fit.discrepancy
     )
     other.theta = min(starts, key=other.objective)
+    other.lay_out(evolve(other.layout, modes=0))
     other.weigh()
+    while (other.layout.modes == 0 and _first_mode(other)) or _add_mode(other):
+        settle(other, layout.settings.most_steps, (*VIBRATION, "creep"))
     return other

@@ -139,6 +139,31 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
     return output, states, changes, late
 
 
+def pulled_inputs(
+    bank: tuple[Complex, Complex], period: float, pull: Array, block: int
+) -> tuple[Array, float]:
+    """Derivatives of Σ_b pull_b y_b by the inputs, summed over blocks, and by the settled input.
+
+    y_b is the mean over block b of what ``bank`` makes of the inputs; ``pull`` and the first result
+    have shape (blocks,).
+    """
+    poles, weights = bank
+    return _pulled_inputs(np.exp(poles * period), weights, pull / block, block)
+
+
+@compiled
+def _pulled_inputs(z: Complex, weights: Complex, pull: Array, block: int) -> tuple[Array, float]:
+    result, later = np.zeros(pull.size), np.zeros(z.size, np.complex128)
+    for b in range(pull.size - 1, -1, -1):
+        for _ in range(block):
+            total = 0.0
+            for i in range(z.size):
+                total += ((1.0 - z[i]) * later[i]).real
+                later[i] = z[i] * later[i] + weights[i] * pull[b]
+            result[b] += total
+    return result, later.real.sum()
+
+
 class HeldFilter:
     """A bank of poles for columns held over blocks, piece by piece; gives means over blocks.
 
@@ -169,18 +194,17 @@ class HeldFilter:
 
         A column that has been zero so far costs nothing.
         """
-        self._live |= columns.any(axis=0)
+        if not self._live.all():
+            self._live |= columns.any(axis=0)
+        if self._live.all():
+            return self._passed(columns, *self._states)
         result, states = np.zeros(columns.shape), np.compress(self._live, self._states, axis=2)
-        result[:, self._live] = _filtered(
-            np.compress(self._live, columns, axis=1),
-            self._z,
-            self._takes,
-            self._modes,
-            self._through,
-            *states,
-        )
+        result[:, self._live] = self._passed(np.compress(self._live, columns, axis=1), *states)
         self._states[:, :, self._live] = states
         return result
+
+    def _passed(self, columns: Array, real: Array, imag: Array) -> Array:
+        return _filtered(columns, self._z, self._takes, self._modes, self._through, real, imag)
 
 
 @compiled

@@ -10,26 +10,20 @@ creep from before it) is linear and eliminated. The Jacobian holds inputs over b
 does not: so a step is approximate, and what it leads to is exact.
 """
 
-from collections.abc import Iterable, Sequence
-from typing import TypeAlias
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from attrs import define, evolve, field
-from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.evidence import best_scales, first_scales
+from afm_scan_ros.core.fit.evidence import first_scales
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
-from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, simulate
+from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, pulled, simulate
 from afm_scan_ros.core.fit.signals import Signals, noise_of
-from afm_scan_ros.core.fit.tones import find_tones
+from afm_scan_ros.core.fit.tones import find_tones, offered_tones
 from afm_scan_ros.core.types import Array
-
-Mask: TypeAlias = NDArray[np.bool_]
-
-VIBRATION = ("lags", "modes")
-"""Groups of parameters of V, which can be fitted while the operator is held."""
 
 
 @define(eq=False)
@@ -37,8 +31,9 @@ class AxisFit:
     """A fit under way: θ (``theta``), the ``gain`` (m/V) and η (``discrepancy``, 1).
 
     ``scales`` are standard deviations of priors. ``remaining`` (nat) is by how much the objective
-    would have fallen in the last step, were it quadratic. The gain stays as the first mode leaves
-    it, for the operator has one.
+    may still fall: what the last step left of what it would have brought, were the objective
+    quadratic. ``quadratic`` is whether it nearly was. The gain stays as the first mode leaves it,
+    for the operator has one. Where it ``grows``, slopes of plays are held to their least value.
     """
 
     layout: Layout
@@ -48,17 +43,24 @@ class AxisFit:
     discrepancy: float = 1.0
     scales: dict[str, float] = field()
     remaining: float = np.inf
+    quadratic: bool = False
+    grows: bool = False
+    damping: float = field()
     _columns: dict[int, list[Columns]] = field(factory=dict)
-    _damping: float = field()
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
     def _first(self) -> dict[str, float]:
         return first_scales(self.layout.settings)
 
-    @_damping.default
+    @damping.default
     def _least(self) -> float:
         return self.layout.settings.least_damping
+
+    @property
+    def converged(self) -> bool:
+        """Whether the parameters were within a third of their standard errors in the mean."""
+        return self.remaining < self.layout.settings.converged * self.layout.size
 
     def variance(self, record: Signals) -> float:
         """Variance v_k of the mean of a block, m²."""
@@ -71,19 +73,24 @@ class AxisFit:
             self._last = self.layout, theta, every
         return self._last[2]
 
-    def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
-        """Residuals (m) of the blocks that count, what is free in each record being fitted."""
-        result = []
+    def _without(self, simulations: Sequence[Simulation]) -> Iterator[tuple[Array, Array]]:
+        """Yield what the model leaves of each record, and that without what is free in it, m."""
         for record, simulation in zip(self.records, simulations, strict=True):
             left = record.mean - self.gain * simulation.response.output[record.used]
-            free = _Free(record, self.layout, self.variance(record))
-            result.append(free.without(left))
-        return result
+            yield left, _Free(record, self.layout, self.variance(record)).without(left)
+
+    def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
+        """Residuals (m) of the blocks that count, what is free in each record being fitted."""
+        return [residual for _, residual in self._without(simulations)]
 
     def misfit(self, theta: Array) -> float:
-        """Half the weighted sum of squared residuals."""
-        pairs = zip(self.records, self.residuals(self.simulated(theta)), strict=True)
-        return sum(0.5 * float(left @ left) / self.variance(record) for record, left in pairs)
+        """Half the weighted sum of squared residuals, and of squared weights of what is free.
+
+        These are fitted, so that both together are half of what the model leaves times what remains
+        of that.
+        """
+        pairs = zip(self.records, self._without(self.simulated(theta)), strict=True)
+        return sum(0.5 * float(a @ b) / self.variance(record) for record, (a, b) in pairs)
 
     def objective(self, theta: Array) -> float:
         """Minus the logarithm of the posterior, but for a constant; infinite where it overflows."""
@@ -91,6 +98,8 @@ class AxisFit:
         apart = theta - mean
         try:
             total = self.misfit(theta) + 0.5 * float(apart @ precision @ apart)
+            if self.grows:
+                total += 0.5 * float(np.sum(self.layout.lacking(theta)[1] ** 2))
         except InputError:  # the map behind the operator turns back
             return np.inf
         return total if np.isfinite(total) else np.inf
@@ -110,9 +119,7 @@ class AxisFit:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             matrix, right = self._normal(with_operator=with_operator)
-        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-            raise ScanError("the fit diverged: its operator's response grows without bound")
-        return matrix, right
+        return _finite(matrix), _finite(right)
 
     def _normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
@@ -120,101 +127,99 @@ class AxisFit:
         lefts = self.residuals(simulations)
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             pieces = self._pieces_of(k) if with_operator else None
-            variance = self.variance(record)
-            free = _Free(record, self.layout, variance)
-            share = np.zeros((free.columns.shape[1], self.layout.size))
+            variance, size = self.variance(record), self.layout.size
+            free, lost = _Free(record, self.layout, variance), lefts[k] / variance
+            products, share = np.zeros((size, size)), np.zeros((free.columns.shape[1], size))
             for rows, one in jacobian(self.layout, self.theta, record, simulation, pieces):
                 live = np.flatnonzero(one.any(axis=0))
-                columns = self.gain * one[:, live]
-                matrix[np.ix_(live, live)] += columns.T @ columns / variance
-                right[live] += columns.T @ lefts[k][rows] / variance
-                share[:, live] += free.columns[rows].T @ columns / variance
+                columns = one[:, live]
+                products[np.ix_(live, live)] += columns.T @ columns
+                right[live] += self.gain * (columns.T @ lost[rows])
+                share[:, live] += self.gain / variance * (free.columns[rows].T @ columns)
+            matrix += np.square(self.gain) / variance * products
             matrix -= share.T @ np.linalg.solve(free.matrix, share)
         return matrix, right
 
-    def step(self, groups: Sequence[str] = (), *, searching: bool = False) -> float:
-        """Take a step of some groups of parameters, or of all; return how far the objective fell.
+    def bent(self, move: Array, part: float, *, with_operator: bool) -> Array:
+        """Right-hand side g for what the second derivative of the model adds to a move.
 
-        Where ``searching``, the scales of the greatest evidence are chosen first. Gains of creep
-        are not negative, and an operator's parameters not below its ``lowest``: one that would pass
-        its bound stays there for this step.
+        It is taken over a part of the move. Raises InputError where the map behind the operator
+        turns back there, and ScanError where the response overflows.
         """
-        parts = self.layout.parts
-        groups = groups or tuple(parts)
-        matrix, right = self.normal(with_operator=not set(groups) <= set(VIBRATION))
-        if searching:
-            self.scales = best_scales(self.layout, self.scales, self.theta, matrix, right)
-        precision, mean = self.layout.prior(self.scales, self.theta)
-        free = np.zeros(self.layout.size, bool)
-        for name in groups:
-            free[parts[name]] = True
-        right = right - precision @ (self.theta - mean)
-        lowest = np.full(self.layout.size, -np.inf)
-        lowest[: parts["map"].start] = self.layout.operator.lowest
-        lowest[parts["creep"]] = 0.0
-        lowest -= self.theta
-        before, whole = self.objective(self.theta), matrix + precision
-        settings = self.layout.settings
-        newton = bounded(whole, right, free, lowest)
-        self.remaining = float(newton @ right - 0.5 * newton @ whole @ newton)
-        for _ in range(settings.most_trials):
-            damped = whole + self._damping * np.diag(np.diag(whole))
-            move = bounded(damped, right, free, lowest)
-            theta = self.theta + move
-            fell = before - self.objective(theta)
-            share = fell / float(move @ right - 0.5 * move @ whole @ move + 1e-300)
-            if share > settings.good_step:
-                self._damping = max(0.1 * self._damping, settings.least_damping)
-            elif share < settings.poor_step:
-                self._damping *= 4.0
-            if fell > 0.0:
-                self.theta = theta
-                return fell
-        return 0.0
+        ends = [self.simulated(self.theta + way * part * move) for way in (1.0, -1.0)]
+        right, here = np.zeros(self.layout.size), self.simulated(self.theta)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, (record, *three) in enumerate(zip(self.records, *ends, here, strict=True)):
+                up, down, middle = (one.response.output[record.used] for one in three)
+                variance = self.variance(record)
+                added = self.gain * (2.0 * middle - up - down) / part**2
+                left = _Free(record, self.layout, variance).without(added)
+                pieces = self._pieces_of(k) if with_operator else None
+                pull = self.gain * left / variance
+                right += pulled(self.layout, self.theta, record, here[k], pieces, pull)
+        return _finite(right)
 
-    def settle(self, steps: int, groups: Sequence[str] = (), *, searching: bool = False) -> None:
-        """Take steps until the objective falls no more, weighing the records after each."""
-        for _ in range(steps):
-            fell = self.step(groups, searching=searching)
-            self.cover()
-            self.weigh()
-            if fell == 0.0 or self.remaining < self.layout.settings.converged:
-                break
+    def cover(self, most: float) -> float:
+        """Let the tables of an operator reach as far as its states do; return what that loses.
 
-    def cover(self) -> None:
-        """Let the tables of an operator reach as far as its states do."""
+        Where tables on other cells would raise the objective by ``most`` (nat) or more, those that
+        there are stay: beyond their cells they continue with the values of their edge.
+        """
         operator = self.layout.operator
         if isinstance(operator, OneState):
             pairs = zip(self.records, self.simulated(self.theta), strict=True)
             states = [simulation.effective - record.drive for record, simulation in pairs]
-            before = self.layout.of_operator(self.theta)
-            wider, theta = operator.covering(before, np.concatenate(states))
+            given = self.layout.of_operator(self.theta)
+            wider, theta = operator.covering(given, np.concatenate(states))
             if wider is not operator:
+                before, kept = self.objective(self.theta), (self.layout, self.theta)
                 self.layout = evolve(self.layout, operator=wider)
                 self.theta = np.concatenate([theta, self.theta[len(theta) :]])
+                if (lost := self.objective(self.theta) - before) < most:
+                    return lost
+                self.layout, self.theta = kept
+        return 0.0
 
     def weigh(self) -> None:
-        """Estimate the noise of records whose blocks are samples, and η, from the residuals."""
-        excess, motion = 0.0, 0.0
+        """Estimate the noise of records whose blocks are samples, and η: the likeliest."""
+        parts = []
         for k, left in enumerate(self.residuals(self.simulated(self.theta))):
             record = self.records[k]
             if record.block == 1:
                 record = self.records[k] = evolve(record, noise=noise_of(left))
-            noise = len(left) * record.noise**2 / record.block
-            excess += max(float(left @ left) - noise, 0.0)
-            motion += len(left) * record.motion**2
-        least = float(np.finfo(np.float32).eps)
-        self.discrepancy = max(float(np.sqrt(excess / motion)), least)
+            noise = record.noise**2 / record.block
+            parts.append((len(left), float(left @ left), noise, record.motion**2))
+        count, squares, noise, motion = np.array(parts).T
+
+        def unlikely(logarithm: float) -> float:
+            variance = noise + np.exp(2.0 * logarithm) * motion
+            return float(np.sum(count * np.log(variance) + squares / variance))
+
+        ends = np.log([np.finfo(np.float32).eps, 1.0 / np.finfo(np.float32).eps])
+        self.discrepancy = float(np.exp(minimize_scalar(unlikely, bounds=ends).x))
 
     def find_tones(self) -> bool:
-        """Let sines in the residuals be free in their records; return whether any are new."""
+        """Let sines in the residuals be free in their records; return whether any are new.
+
+        A record too short to show a sine is tried for those of the others, and for mains.
+        """
+        settings = self.layout.settings
         simulations, before = self.simulated(self.theta), [one.tones for one in self.records]
-        for k, left in enumerate(self.residuals(simulations)):
+        lefts = self.residuals(simulations)
+        for k, left in enumerate(lefts):
             record = self.records[k]
             motion = self.gain * simulations[k].response.output[record.used]
             given = left, motion, self.discrepancy, record.length
-            found = find_tones(*given, self.layout.settings)
-            self.records[k] = record.with_tones(found, self.layout.settings.tone_most)
+            self.records[k] = record.with_tones(find_tones(*given, settings), settings.tone_most)
+        known = {tone for record in self.records for tone in record.tones}
+        known |= {settings.slower_mains, settings.faster_mains}
+        for k, left in enumerate(lefts):
+            record = self.records[k]
+            lasts = record.length * len(record.mean)
+            hidden = [tone for tone in known if 1.0 < tone * lasts < settings.tone_cycles]
+            expected = self.variance(record)
+            found = offered_tones(left, record.seconds, hidden, expected, settings)
+            self.records[k] = record.with_tones(found, settings.tone_most)
         self.weigh()
         return before != [one.tones for one in self.records]
 
@@ -242,6 +247,12 @@ class AxisFit:
         return pieces
 
 
+def _finite(values: Array) -> Array:
+    if not np.isfinite(values).all():
+        raise ScanError("the fit diverged: its operator's response grows without bound")
+    return values
+
+
 class _Free:
     """What is free in one record, as linear regressors with their prior."""
 
@@ -255,25 +266,3 @@ class _Free:
         """Return a signal without what the regressors explain of it."""
         right = self.columns.T @ signal / self._variance
         return np.asarray(signal - self.columns @ np.linalg.solve(self.matrix, right))
-
-
-def bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
-    """Move of the free parameters, none below its lowest, that lowers ½ mᵀHm - gᵀm most.
-
-    All that would pass their bound are held there, and all held that pull away from it are let go,
-    while these become fewer; then one at a time, so that this ends.
-    Source: J. Kim and H. Park, SIAM J. Sci. Comput. 33 (2011) 3261, section 3.
-    """
-    move, loose, fewest = np.zeros(len(right)), free.copy(), len(right) + 1
-    for _ in range(3 * len(right)):
-        held = free & ~loose
-        move[held] = lowest[held]
-        pull = right[loose] - matrix[np.ix_(loose, held)] @ move[held]
-        move[loose] = np.linalg.solve(matrix[np.ix_(loose, loose)], pull)
-        wrong = np.flatnonzero((loose & (move < lowest)) | (held & (right - matrix @ move > 0.0)))
-        if len(wrong) == 0:
-            break
-        exchanged = wrong if len(wrong) < fewest else wrong[-1:]
-        fewest = min(fewest, len(wrong))
-        loose[exchanged] = ~loose[exchanged]
-    return np.where(free, np.maximum(move, lowest), 0.0)

@@ -7,16 +7,19 @@ coefficients of cubic B-splines on cells of u and of w. Coleman's and Hodgdon's 
 Wen's are of this form, also between memoryless maps, so no map is fitted behind it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
 from scipy.interpolate import BSpline
 
-from afm_scan_ros.core.effects.hysteresis.branches import by_input, sensitivities
+from afm_scan_ros.core.effects.hysteresis.branches import (
+    by_input,
+    mean_sensitivities,
+    sensitivities,
+)
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged
 from afm_scan_ros.core.types import Array
 
 
@@ -81,21 +84,35 @@ class OneState:
         return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
 
     def pieces(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Iterator[Array]:
-        """Yield ∂A/∂theta for the mean drive of blocks, in pieces of shape (blocks, parameters)."""
-        path = averaged(drive, block)
+        """Yield ∂A/∂theta averaged over blocks, in pieces of shape (blocks, parameters)."""
         now, grown = np.array([0.0 if rested else drive[0], 0.0]), self.unbent()
-        at_once = self.settings.blocks_at_once
-        tables, open_end = theta.reshape(self.shape), np.full(at_once, np.nan)
-        for first in range(0, len(path), at_once):
-            part = path[first : first + at_once]
-            yield sensitivities(tables, self.cells, now, grown, part, open_end)[1]
+        tables, size = theta.reshape(self.shape), block * self.settings.blocks_at_once
+        for first in range(0, len(drive) // block * block, size):
+            part = drive[first : first + size]
+            yield mean_sensitivities(tables, self.cells, now, grown, part, block)
 
-    def started(self, paths: Iterable[tuple[Array, Array]]) -> list[Array]:
+    def started(self, paths: Sequence[tuple[Array, Array]]) -> list[Array]:
         """Slopes that lead from each sample of drive and A (V) to the next, ever smoother ones.
 
         Paths that no such operator makes give slopes that lead astray unless they are smooth. So
         the last have no hysteresis, and none exceeds what is expected of a slope.
         """
+        prior = self.precision("slopes", {"slopes": 0.1 * self.settings.slopes})
+        first = self._stepped(paths, self.unbent())
+        prior *= np.trace(first[0]) / np.trace(prior)
+        found = []
+        for strength in np.logspace(-12.0, 0.0, 9):
+            theta, (matrix, right) = self.unbent(), first
+            for done in range(self.settings.start_rounds):
+                if done:
+                    matrix, right = self._stepped(paths, theta)
+                theta = np.linalg.solve(matrix + strength * prior, right)
+                theta = np.clip(theta, self.lowest, self.settings.slopes)
+            found.append(theta)
+        return [*found, self.unbent()]
+
+    def _stepped(self, paths: Sequence[tuple[Array, Array]], theta: Array) -> tuple[Array, Array]:
+        """Normal equations for the slopes that lead from sample to sample, linearised at some."""
         matrix, right = np.zeros((self.parts["slopes"],) * 2), self.unbent()
         at_once = self.settings.blocks_at_once
         for drive, output in paths:
@@ -103,16 +120,13 @@ class OneState:
             for first in range(0, len(drive) - 1, at_once):
                 part = slice(first + 1, first + at_once + 1)
                 now, grown = np.array([drive[first], w[first]]), self.unbent()
-                flat = self.unbent().reshape(self.shape)
-                jacobian = sensitivities(flat, self.cells, now, grown, drive[part], w[part])[1]
-                matrix += jacobian.T @ jacobian
-                right += jacobian.T @ np.diff(w[first : first + at_once + 1])
-        prior = self.precision("slopes", {"slopes": 0.1 * self.settings.slopes})
-        prior *= np.trace(matrix) / np.trace(prior)
-        strengths = np.logspace(-12.0, 0.0, 9)
-        found = [np.linalg.solve(matrix + one * prior, right) for one in strengths]
-        ends = self.lowest, self.settings.slopes
-        return [*(np.clip(one, *ends) for one in found), self.unbent()]
+                given = theta.reshape(self.shape), self.cells, now, grown
+                reached, jacobian = sensitivities(*given, drive[part], w[part])
+                live = np.flatnonzero(jacobian.any(axis=0))
+                columns = jacobian[:, live]
+                matrix[np.ix_(live, live)] += columns.T @ columns
+                right[live] += columns.T @ (w[part] - reached + columns @ theta[live])
+        return matrix, right
 
     def covering(self, theta: Array, states: Array) -> tuple["OneState", Array]:
         """Return the same slopes on cells that reach just beyond all states w (V).

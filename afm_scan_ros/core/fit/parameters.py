@@ -18,6 +18,7 @@ from scipy.linalg import block_diag
 
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.fit.dynamics import PoleBank
+from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -84,12 +85,32 @@ class Layout:
         return OutputMap(*ends, tuple(bends)) if bends.any() else None
 
     def of_modes(self, theta: Array) -> list[Mode]:
-        """Return the modes; a pair of poles stays complex."""
+        """Return the modes, of which θ holds ln ω, -ln ζ and both parts of κ."""
         modes = theta[self.parts["modes"]].reshape(self.modes, 4)
         return [
-            (float(np.exp(omega)), float(np.exp(min(damping, -0.05))), float(real), float(imag))
-            for omega, damping, real, imag in modes
+            (float(np.exp(omega)), float(np.exp(-sharpness)), float(real), float(imag))
+            for omega, sharpness, real, imag in modes
         ]
+
+    def lowest(self) -> Array:
+        """Least values of θ: slopes with an inverse, no negative creep, and no broader mode."""
+        result = np.full(self.size, -np.inf)
+        result[: self.parts["map"].start] = self.operator.lowest
+        sharpest = -np.log(self.settings.greatest_damping)
+        result[self.parts["modes"]] = np.tile([-np.inf, sharpest, -np.inf, -np.inf], self.modes)
+        result[self.parts["creep"]] = 0.0
+        return result
+
+    @cached_property
+    def _growth(self) -> Growth | None:
+        return Growth(self.operator) if isinstance(self.operator, Plays) else None
+
+    def lacking(self, theta: Array) -> tuple[Array, Array]:
+        """Conditions that the plays' surface grows, where θ fails them: see ``Growth.lacking``."""
+        if self._growth is None:
+            return np.zeros((0, self.size)), np.zeros(0)
+        rows, lacks = self._growth.lacking(self.of_operator(theta))
+        return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:
         """Return the linear part."""
@@ -108,10 +129,14 @@ class Layout:
     def with_mode(self, theta: Array, mode: Mode) -> tuple["Layout", Array]:
         """Add a mode, at the expense of the fastest lag."""
         omega, damping, real, imag = mode
-        added = [np.log(omega), np.log(damping), real, imag]
+        added = [np.log(omega), -np.log(damping), real, imag]
         more = np.insert(theta, self.parts["modes"].stop, added)
         more[self.parts["lags"].start] -= real
         return evolve(self, modes=self.modes + 1), more
+
+    def conditioned(self, matrix: Array) -> Array:
+        """Return normal equations whose flattest directions exceed the rounding of others."""
+        return np.asarray(matrix + self.settings.least_damping * np.diag(np.diag(matrix)))
 
     def prior(self, scales: Mapping[str, float], theta: Array) -> tuple[Array, Array]:
         """Precision of the prior, and its mean, shapes (size, size) and (size,).
@@ -138,7 +163,7 @@ class Layout:
         mean[parts["lags"].start] = 1.0
         first, last = parts["modes"].start, parts["modes"].stop
         mean[first:last:4] = theta[first:last:4]
-        mean[first + 1 : last : 4] = np.log(s.damping)
+        mean[first + 1 : last : 4] = -np.log(s.damping)
         return matrix, mean
 
 
@@ -151,13 +176,14 @@ def layout_of(
 ) -> Layout:
     """Places of lags and creep, by the longest record, the shortest sample period and a mode.
 
-    Both are in s, ``omega`` in rad/s. Without a mode there are no lags but the fastest.
+    All are in s but ``omega``, in rad/s. Without a mode the samples say what is a lag and what is
+    creep.
     """
-    seen, fastest = np.array([0.2 * shortest]), 10.0 * shortest
+    slowest, fastest = settings.lag_samples * shortest, settings.creep_samples * shortest
     if omega is not None:
         slowest = settings.slowest_lag / omega
-        lags = np.geomspace(slowest / 8.0, slowest, settings.fast_lags)
-        seen = np.concatenate([seen, lags])
         fastest = max(settings.fastest_creep / omega, 5.0 * shortest)
+    lags = np.geomspace(slowest / 8.0, slowest, settings.fast_lags)
+    seen = np.concatenate([[0.2 * shortest], lags])
     count = max(round(settings.creep_per_decade * np.log10(longest / fastest)), 3)
     return Layout(operator, seen, np.geomspace(fastest, longest, count), settings)

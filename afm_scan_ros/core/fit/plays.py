@@ -83,23 +83,33 @@ class Plays:
 
     @cached_property
     def positions(self) -> Array:
-        """Positions of a play (V) at which T_r is tabulated, shape (table,): 128 in each cell."""
-        return np.linspace(self.lower, self.upper, 128 * self.settings.correction_cells + 1)
+        """Positions of a play (V) at which T_r is tabulated, shape (table,): 64 in each cell."""
+        return np.linspace(self.lower, self.upper, 64 * self.settings.correction_cells + 1)
+
+    @cached_property
+    def knots(self) -> Array:
+        """Knots of the B-splines b_j, V."""
+        cells = self.settings.correction_cells
+        return self.lower + 2.0 * self.half / cells * np.arange(-2.0, cells + 3.0)
 
     @cached_property
     def rises(self) -> Array:
         """Integrals of the B-splines over the position from the middle, V, (splines, table)."""
-        cells = self.settings.correction_cells
-        knots = np.arange(-2.0, cells + 3.0) / cells
-        place = np.linspace(0.0, 1.0, len(self.positions))
-        splines = (BSpline(knots, one, 2).antiderivative() for one in np.eye(cells + 2))
-        return np.asarray(2.0 * self.half * np.array([each(place) - each(0.5) for each in splines]))
+        splines = BSpline(self.knots, np.eye(len(self.knots) - 3), 2).antiderivative()
+        return np.asarray((splines(self.positions) - splines(0.5 * (self.lower + self.upper))).T)
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which splines some play about each coarse threshold reaches, shape (coarse, splines)."""
+        nearest = self.thresholds[np.argmax(self.blend > 0.0, axis=0), np.newaxis]
+        lowest = np.minimum(0.0, self.lower + nearest)
+        highest = np.maximum(0.0, self.upper - nearest)
+        return np.asarray((self.knots[3:] > lowest) & (self.knots[:-3] < highest))
 
     @property
     def parts(self) -> dict[str, int]:
         """Number of parameters of each group."""
-        coarse = self.settings.correction_plays * len(self.rises)
-        return {"density": len(self.thresholds), "correction": coarse}
+        return {"density": len(self.thresholds), "correction": int(self.reached.sum())}
 
     def unbent(self) -> Array:
         """Weights of no hysteresis, F = u."""
@@ -112,11 +122,7 @@ class Plays:
         drive itself, the first, is nearly free.
         """
         if name == "correction":
-            rows, columns = self.settings.correction_plays, len(self.rises)
-            along, across = (np.diff(np.eye(size), 2, axis=0) for size in (rows, columns))
-            bent = np.kron(along.T @ along, np.eye(columns))
-            bent += np.kron(np.eye(rows), across.T @ across)
-            return np.asarray((bent + 0.05 * np.eye(len(bent))) / scales["correction"] ** 2)
+            return self._smooth_correction / scales["correction"] ** 2
         plays = len(self.thresholds) - 1
         bent = _bends(np.log(self.thresholds[1:]))
         smooth = (
@@ -125,15 +131,48 @@ class Plays:
         rough = scales["rough_density"] ** 2 * np.eye(plays)
         return np.asarray(block_diag(1.0, np.linalg.inv(np.linalg.inv(smooth) + rough)))
 
+    @cached_property
+    def _smooth_correction(self) -> Array:
+        """Precision of the correction's coefficients, those that no play reaches being free."""
+        rows, columns = self.reached.shape
+        along, across = (np.diff(np.eye(size), 2, axis=0) for size in (rows, columns))
+        bent = np.kron(along.T @ along, np.eye(columns))
+        bent += np.kron(np.eye(rows), across.T @ across)
+        covariance = np.linalg.inv(bent + 0.05 * np.eye(len(bent)))
+        some = np.flatnonzero(self.reached)
+        return np.asarray(np.linalg.inv(covariance[np.ix_(some, some)]))
+
+    @cached_property
+    def settled(self) -> Array:
+        """Plays (V) after a first drive from depolarised rest to both ends of the range.
+
+        Those of thresholds above half the range stay there ever after. For the others, which any
+        such drive writes anew, the value is that of rest.
+        """
+        pushed = np.clip(0.0, self.upper - self.thresholds, self.lower + self.thresholds)
+        return np.where(self.thresholds > self.half, pushed, 0.0)
+
     def start(self, drive: Array, *, rested: bool) -> Array:
-        """Plays before a drive (V): in their middle at depolarised rest, or else at its start."""
-        return np.full(len(self.thresholds), 0.0 if rested else float(drive[0]))
+        """Plays before a drive (V), of a scanner at depolarised rest or of one in use.
+
+        One in use has been at both ends of the range; what its smaller plays remember is not known,
+        and they are at the start of the drive.
+        """
+        if rested:
+            return np.zeros(len(self.thresholds))
+        return np.where(self.thresholds > self.half, self.settled, float(drive[0]))
+
+    def weights(self, theta: Array) -> tuple[Array, Array]:
+        """Density d_r, shape (plays,), and the correction's Σ_j c_j(r) b_j as (plays, splines)."""
+        density, correction = theta[: len(self.thresholds)], np.zeros(self.reached.shape)
+        correction[self.reached] = theta[len(self.thresholds) :]
+        return density, self.blend @ correction
 
     def tables(self, theta: Array) -> Array:
         """T_r at the positions, shape (plays, table)."""
-        density, correction = np.split(theta, [len(self.thresholds)])
-        along = self.blend @ correction.reshape(-1, len(self.rises)) @ self.rises
-        return np.asarray(self.widths[:, np.newaxis] * (np.outer(density, self.positions) + along))
+        density, correction = self.weights(theta)
+        along = np.outer(density, self.positions) + correction @ self.rises
+        return np.asarray(self.widths[:, np.newaxis] * along)
 
     def output(self, theta: Array, drive: Array, *, rested: bool) -> Array:
         """P(u) in V for a drive u (V), both (n,)."""
@@ -158,20 +197,30 @@ class Plays:
         count = len(self.thresholds)
         result = np.empty((len(plays), sum(self.parts.values())), np.float32)
         result[:, :count] = plays * self.widths
+        place = count - 1 + np.cumsum(self.reached).reshape(self.reached.shape)
         for j, rise in enumerate(self.rises):
+            some = self.reached[:, j]
             along = np.interp(plays, self.positions, rise)
-            result[:, count + j :: len(self.rises)] = along @ mixing
+            result[:, place[some, j]] = along @ mixing[:, some]
         return result
+
+    @property
+    def levels(self) -> Array:
+        """Levels of the Everett surface, V."""
+        return np.linspace(self.lower, self.upper, self.settings.surface_levels)
 
     def surface(self, theta: Array) -> EverettSurface:
         """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
 
-        Plays that the range cannot push both ways do not move within it.
+        Plays that the range cannot push both ways stay where they have settled.
         """
-        levels = np.linspace(self.lower, self.upper, self.settings.surface_levels)
+        levels = self.levels
         values, offset = np.zeros((len(levels),) * 2), 0.0
-        moving = self.thresholds <= self.half
-        for r, table in zip(self.thresholds[moving], self.tables(theta)[moving], strict=True):
+        each_play = zip(self.thresholds, self.settled, self.tables(theta), strict=True)
+        for r, settled, table in each_play:
+            if r > self.half:
+                offset += float(np.interp(settled, self.positions, table))
+                continue
             top = levels[:, np.newaxis] - r
             risen, fallen = (
                 np.interp(each, self.positions, table)

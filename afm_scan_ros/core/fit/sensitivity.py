@@ -6,7 +6,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
-from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, respond
+from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, pulled_inputs, respond
 from afm_scan_ros.core.fit.parameters import Columns, Layout
 from afm_scan_ros.core.fit.signals import Signals, averaged
 from afm_scan_ros.core.types import Array
@@ -67,6 +67,44 @@ def jacobian(
         first = last
 
 
+def pulled(
+    layout: Layout,
+    theta: Array,
+    record: Signals,
+    simulation: Simulation,
+    pieces: Iterable[Columns] | None,
+    pull: Array,
+) -> Array:
+    """Return Jᵀ pull, shape (size,), with the blocks' J of ``jacobian``, without making it.
+
+    What V and C do to the columns of J is done backwards to ``pull``, shape (blocks that count,).
+    """
+    parts, whole = layout.parts, np.zeros(record.blocks)
+    whole[record.used] = pull
+    result = np.zeros(layout.size)
+    vibration = slice(parts["lags"].start, parts["modes"].stop)
+    result[vibration] = whole @ _of_vibration(layout, theta, record, simulation)
+    result[parts["creep"]] = whole @ simulation.response.late
+    if pieces is not None:
+        operator, mapped = layout.operator, layout.map_of(theta)
+        bank, first = simulation.dynamics.parallel(), 0
+        inputs, settled = pulled_inputs(bank, record.period, whole, record.block)
+        if record.rested:
+            result[: parts["map"].stop] += settled * _at_rest(layout, theta)
+        else:
+            inputs[0] += settled
+        effective = averaged(simulation.effective, record.block)
+        if mapped is not None:
+            inputs /= mapped.slope(effective)
+        bends = terms(effective, operator.lower, operator.upper, operator.bends)
+        result[parts["map"]] -= inputs @ bends
+        for columns in pieces:
+            part = inputs[first : first + len(columns)]
+            result[: columns.shape[1]] += np.matmul(part.astype(columns.dtype), columns)
+            first += len(columns)
+    return result
+
+
 def _of_operator(
     layout: Layout, theta: Array, record: Signals, simulation: Simulation, pieces: Iterable[Columns]
 ) -> Iterator[Array]:
@@ -76,34 +114,39 @@ def _of_operator(
     """
     operator, mapped = layout.operator, layout.map_of(theta)
     effective = averaged(simulation.effective, record.block)
+    bends = terms(effective, operator.lower, operator.upper, operator.bends)
+    slopes = np.ones_like(effective) if mapped is None else mapped.slope(effective)
     bank, first, through = simulation.dynamics.parallel(), 0, None
     for columns in pieces:
-        part = effective[first : first + len(columns)]
-        inputs, first = columns.astype(float), first + len(columns)
-        if operator.bends:
-            bends = terms(part, operator.lower, operator.upper, operator.bends)
-            inputs = np.hstack([inputs, -bends])
-        if mapped is not None:
-            inputs /= mapped.slope(part)[:, np.newaxis]
+        part, first = slice(first, first + len(columns)), first + len(columns)
+        inputs = np.hstack([columns.astype(float), -bends[part]])
+        inputs /= slopes[part, np.newaxis]
         if through is None:
-            settled = inputs[0].copy()
-            if record.rested:
-                (rest,) = operator.pieces(layout.of_operator(theta), np.zeros(1), 1, rested=True)
-                slope = 1.0 if mapped is None else mapped.slope(part[:1])[0]
-                settled[: rest.shape[1]] = rest[0] / slope
+            settled = _at_rest(layout, theta) if record.rested else inputs[0]
             through = HeldFilter(bank, 0.0, record.length, record.block, settled)
         yield through(inputs)
 
 
+def _at_rest(layout: Layout, theta: Array) -> Array:
+    """Derivatives of F at depolarised rest by the operator and its map."""
+    operator, given, rest = layout.operator, layout.of_operator(theta), np.zeros(1)
+    mapped, at = layout.map_of(theta), operator.output(given, rest, rested=True)
+    at = at if mapped is None else mapped.output(at)
+    (columns,) = operator.pieces(given, rest, 1, rested=True)
+    bends = terms(at, operator.lower, operator.upper, operator.bends)
+    slope = 1.0 if mapped is None else mapped.slope(at)[0]
+    return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
+
+
 def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
-    """Derivatives by the weights of the lags, and by frequency, damping and weight of each mode."""
+    """Derivatives by the weights of the lags, and by what θ holds of each mode."""
     dynamics, response = simulation.dynamics, simulation.response
     lags = response.states[:, dynamics.modes :].real
     columns, settled = [lags], [np.full(lags.shape[1], simulation.settled)]
     for i, (omega, damping, *_) in enumerate(layout.of_modes(theta)):
         state, change = response.states[:, i], dynamics.weights[i] * response.changes[:, i]
         pole = dynamics.poles[i]
-        turned = -omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
+        turned = omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
         moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]
         columns.append(np.column_stack(moved))
         settled.append(np.array([0.0, 0.0, simulation.settled, 0.0]))

@@ -28,16 +28,16 @@ class FitSettings:
         "each is 1.5 times the last",
     )
     correction_plays: int = setting(
-        11,
+        14,
         "1",
         "thresholds between which the correction is linear",
         "the correction is smooth",
     )
     correction_cells: int = setting(
-        4,
+        16,
         "1",
         "cells of the correction's splines over the range",
-        "the correction is smooth",
+        "densities of materials rise and fall over a tenth of the range: 6 leave 0.1 %",
     )
     surface_levels: int = setting(
         161,
@@ -69,11 +69,23 @@ class FitSettings:
         "how far the slopes reach beyond the states of the start",
         "the start errs by a few per cent",
     )
+    start_rounds: int = setting(
+        3,
+        "1",
+        "linearisations of the slopes that an operator of one state starts from",
+        "the first errs by the change of the state over a sample",
+    )
     least_slope: float = setting(
         0.02,
         "1",
         "least slope dA/du of a model",
         "only an output that grows has an inverse",
+    )
+    slope_tolerance: float = setting(
+        1e-5,
+        "1",
+        "standard deviation by which slopes of plays fall short of least_slope",
+        "a thousandth of least_slope costs 2 nat",
     )
     map_terms: int = setting(
         4,
@@ -106,7 +118,7 @@ class FitSettings:
         "a tenth of the density",
     )
     output_map: float = setting(
-        0.2,
+        0.05,
         "half range",
         "greatest standard deviation of the map's coefficients",
         "stages bend by some 5 %",
@@ -147,6 +159,18 @@ class FitSettings:
         "slowest fast lag; omega is the first mode's angular frequency",
         "slower lags are creep",
     )
+    lag_samples: float = setting(
+        5.0,
+        "samples",
+        "slowest lag where no mode is seen",
+        "a lag is a matter of few samples, slower ones are creep",
+    )
+    creep_samples: float = setting(
+        10.0,
+        "samples",
+        "fastest time constant of creep where no mode is seen",
+        "twice the slowest lag, as no creep may be at the place of a lag",
+    )
     fastest_creep: float = setting(
         50.0,
         "1/omega",
@@ -177,10 +201,28 @@ class FitSettings:
         "least gain in likelihood for a mode",
         "four parameters at one of some 1000 frequencies",
     )
-    mode_share: float = setting(
-        0.05,
+    mode_band: float = setting(
+        0.2,
+        "frequency",
+        "half width of the band in which a mode is sought",
+        "a few bandwidths of a mode, over which other modes and hysteresis are smooth",
+    )
+    mode_trials: int = setting(
+        40,
         "1",
-        "least share of the misfit that a mode explains",
+        "frequencies and dampings tried to refine a mode that was found",
+        "on scanners made for tests within 2 % of the damping that 400 trials find",
+    )
+    greatest_damping: float = setting(
+        0.12,
+        "1",
+        "damping above which a bend of the response is no mode",
+        "piezo stages have 0.003 to 0.1",
+    )
+    mode_share: float = setting(
+        0.2,
+        "1",
+        "least share of the residuals in its band that a mode explains beside a smooth response",
         "seen on scanners made for tests: no derivation",
     )
     dominant_share: float = setting(
@@ -195,6 +237,12 @@ class FitSettings:
         "modes at most",
         "each costs a fit, and stages show one to three",
     )
+    decided: float = setting(
+        10.0,
+        "1",
+        "evidence between two operators over what steps may still add to the worse one's",
+        "the likelihood grows by more than steps foresee where the discrepancy falls",
+    )
     stage_steps: int = setting(
         4,
         "1",
@@ -202,34 +250,40 @@ class FitSettings:
         "a stage only has to start the next",
     )
     most_steps: int = setting(
-        25,
+        60,
         "1",
         "steps of the last stage at most",
-        "fits that converge need 12 to 15",
+        "most fits converge in 15, those of one state in 40",
     )
     most_trials: int = setting(
         12,
         "1",
         "dampings tried for a step at most",
-        "each is four times the last",
+        "the last is 2 to the power of 66 times the first",
+    )
+    damped_alone: float = setting(
+        0.03,
+        "1",
+        "share of the diagonal in the damping of an operator's tables; the rest is the prior's",
+        "of 0, 0.03 and 1 the lowest objective after 16 steps on one sweep, any_lab 65",
     )
     least_damping: float = setting(
-        1e-6,
+        1e-12,
         "1",
         "least damping of a step, over the diagonal of the normal equations",
-        "it moves a step by less than their rounding",
+        "flatter directions drown in the rounding of derivatives to single precision",
     )
-    good_step: float = setting(
+    bend_step: float = setting(
+        0.1,
+        "step",
+        "part of a step over which the model's second derivative is taken",
+        "M. K. Transtrum and J. P. Sethna, arXiv:1201.5885",
+    )
+    most_bend: float = setting(
         0.75,
-        "1",
-        "fall of the objective over that of its quadratic model from which damping falls",
-        "Fletcher, AERE R 6799 (1971)",
-    )
-    poor_step: float = setting(
-        0.25,
-        "1",
-        "fall of the objective over that of its quadratic model below which damping grows",
-        "Fletcher, AERE R 6799 (1971)",
+        "step",
+        "longest geodesic acceleration that bends a step",
+        "M. K. Transtrum and J. P. Sethna, arXiv:1201.5885",
     )
     blocks_at_once: int = setting(
         1024,
@@ -238,10 +292,10 @@ class FitSettings:
         "a processor's cache holds them",
     )
     converged: float = setting(
-        1.0,
-        "nat",
+        0.05,
+        "nat a parameter",
         "gain of a step below which a fit has converged",
-        "a move by about one standard error",
+        "a move by a third of a standard error in the mean",
     )
     tone_chance: float = setting(
         1e-3,
@@ -272,6 +326,18 @@ class FitSettings:
         "1",
         "share of a line's power above which a bin near it is that line's",
         "13 dB, two bins of Hann's window",
+    )
+    slower_mains: float = setting(
+        50.0,
+        "Hz",
+        "mains, sought in records too short to show a tone",
+        "IEC 60038",
+    )
+    faster_mains: float = setting(
+        60.0,
+        "Hz",
+        "mains, sought in records too short to show a tone",
+        "IEC 60038",
     )
     tone_cycles: float = setting(
         10.0,

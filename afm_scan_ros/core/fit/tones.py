@@ -4,7 +4,7 @@ A sine is one line of the residual's spectrum. Of noise alone, the power of one 
 mean about it exceeds ln(n / chance) with the probability ``chance``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,31 @@ def find_tones(
         pair = np.column_stack([np.cos(turn), np.sin(turn)])
         left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
         found.append(frequency / period)
+    return found
+
+
+def offered_tones(
+    residual: Array,
+    seconds: Array,
+    tones: Iterable[float],
+    variance: float,
+    settings: FitSettings,
+) -> list[float]:
+    """Those of some frequencies (Hz) that a residual (m) of a ``variance`` (m²) has, best first.
+
+    A record too short to show a sine among its neighbours may still hold one that is known.
+    """
+    left, found, others = residual - residual.mean(), [], list(tones)
+    while others:
+        turns = 2.0 * np.pi * np.outer(others, seconds)
+        pairs = np.stack([np.cos(turns), np.sin(turns)], axis=2)
+        pairs -= pairs.mean(axis=1, keepdims=True)
+        fitted = [pair @ np.linalg.lstsq(pair, left, rcond=None)[0] for pair in pairs]
+        best = max(range(len(others)), key=lambda k: float(left @ fitted[k]))
+        if 0.5 * float(left @ fitted[best]) / variance < settings.mode_chance:
+            break
+        left = left - fitted[best]
+        found.append(others.pop(best))
     return found
 
 

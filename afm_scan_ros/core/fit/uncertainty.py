@@ -33,7 +33,7 @@ def covariance(fit: AxisFit) -> Array:
     """Covariance of θ, shape (size, size)."""
     precision, _ = fit.layout.prior(fit.scales, fit.theta)
     matrix, _ = fit.normal(with_operator=True)
-    factor = cho_factor(matrix + precision)
+    factor = cho_factor(fit.layout.conditioned(matrix + precision))
     return np.asarray(cho_solve(factor, np.eye(len(matrix))))
 
 

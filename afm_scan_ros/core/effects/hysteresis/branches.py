@@ -9,6 +9,7 @@ u: so a branch followed by output meets the one followed by input up to rounding
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.types import Array
@@ -19,12 +20,23 @@ SOLVED = 1e-14
 """Share of the output's range to which an input is solved for."""
 TRIALS = 100
 """Newton's steps, or halvings, at most; three are usual."""
+SMALL = float(np.sqrt(np.finfo(np.float64).tiny))
+"""Derivatives below this are forgotten: their products would underflow, which is slow."""
+APART = float(np.sqrt(np.sqrt(np.finfo(np.float64).eps)))
+"""Least scale of derivatives, or least inverse of it: their sums lose a quarter of all digits."""
 
 Grid: TypeAlias = tuple[float, float, float, float]
 """Lowest input and its cell, lowest w and its cell, V."""
 Centre: TypeAlias = tuple[Array, Array]
 """Coefficients of the centre curve's slope (V/V), and its heights (V) at the knots."""
 Weights: TypeAlias = tuple[float, float, float, float]
+Work: TypeAlias = tuple[NDArray[np.int64], Array]
+"""Cells and splines of u and of w at the four points of a step, (4, 2) and (4, 2, 4)."""
+Scaled: TypeAlias = tuple[Array, Array, Array]
+"""Derivatives d, (values,), that share a scale s: s d, and their sum over samples is S d + r.
+
+The three arrays are d, the rest r, (values,), and s with its sum S over the samples.
+"""
 
 
 @inlined
@@ -195,41 +207,144 @@ def by_output(
     return block.size, 0.0
 
 
+@inlined
+def _slope_and_bend(
+    table: Array, grid: Grid, at: tuple[float, float], work: Work, stage: int
+) -> tuple[float, float]:
+    """Return ``change`` at a point (u, w) and its derivative by w; keep the splines there.
+
+    Beyond the cells of w the slope does not change.
+    """
+    (u, w), (places, splines) = at, work
+    cells = table.shape[1] - 3
+    i, t = _place(u, grid[0], grid[1], table.shape[0] - 3)
+    j, s = _place(w, grid[2], grid[3], cells)
+    along, across, growth = _weights(t), _weights(s), _growth(s)
+    slope, bend = 0.0, 0.0
+    for a in range(4):
+        row, turn = 0.0, 0.0
+        for b in range(4):
+            row += across[b] * table[i + a, j + b]
+            turn += growth[b] * table[i + a, j + b]
+        slope += along[a] * row
+        bend += along[a] * turn
+        splines[stage, 0, a], splines[stage, 1, a] = along[a], across[a]
+    places[stage, 0], places[stage, 1] = i, j
+    inside = 0.0 < w - grid[2] < cells * grid[3]
+    return slope, bend / grid[3] if inside else 0.0
+
+
+@compiled
+def _grow(
+    tables: Array, side: int, grid: Grid, way: tuple[float, float, float], grown: Scaled, work: Work
+) -> float:
+    """Take one ``step`` from (u, w) to the input ``far``, and its derivatives by the tables.
+
+    They are those of the step as it is computed: the shares of its four slopes in w at the end,
+    each with what it does through those after it, from the last one back.
+    """
+    table, (u, w, far) = tables[side], way
+    length = far - u
+    half, end = 0.5 * length, length / 6.0
+    k1, bend1 = _slope_and_bend(table, grid, (u, w), work, 0)
+    k2, bend2 = _slope_and_bend(table, grid, (u + half, w + half * k1), work, 1)
+    k3, bend3 = _slope_and_bend(table, grid, (u + half, w + half * k2), work, 2)
+    k4, bend4 = _slope_and_bend(table, grid, (far, w + length * k3), work, 3)
+    third = 2.0 * end + length * bend4 * end
+    second = 2.0 * end + half * bend3 * third
+    first = end + half * bend2 * second
+    growth = 1.0 + first * bend1 + second * bend2 + third * bend3 + end * bend4
+    _spread(grown, growth, (first, second, third, end), side, table.shape, work)
+    return w + end * (k1 + 2.0 * (k2 + k3) + k4)
+
+
+@inlined
+def _spread(
+    grown: Scaled, growth: float, shares: Weights, side: int, shape: tuple[int, int], work: Work
+) -> None:
+    """Let derivatives grow, and add shares of the splines at four points to those of one side.
+
+    Their scale grows in place of all of them. What is added is no part of the samples before.
+    """
+    derivatives, rest, scales = grown
+    places, splines = work
+    scales[0] *= growth
+    if not APART < abs(scales[0]) < 1.0 / APART:
+        _rescale(grown)
+    first, rows = side * shape[0] * shape[1], shape[1]
+    for stage in range(4):
+        share = shares[stage] / scales[0]
+        place = first + places[stage, 0] * rows + places[stage, 1]
+        for a in range(4):
+            for b in range(4):
+                part = share * splines[stage, 0, a] * splines[stage, 1, b]
+                derivatives[place + a * rows + b] += part
+                rest[place + a * rows + b] -= scales[1] * part
+
+
+@compiled
+def _rescale(grown: Scaled) -> None:
+    """Bring derivatives to a scale of one, and the rest of their sum to the whole of it."""
+    derivatives, rest, scales = grown
+    for m in range(derivatives.size):
+        rest[m] += scales[1] * derivatives[m]
+        value = scales[0] * derivatives[m]
+        derivatives[m] = value if abs(value) > SMALL else 0.0
+    scales[0], scales[1] = 1.0, 0.0
+
+
 @compiled
 def sensitivities(
-    tables: Array, grid: Grid, now: Array, grown: Array, path: Array, known: Array
+    tables: Array, grid: Grid, now: Array, derivatives: Array, path: Array, known: Array
 ) -> tuple[Array, Array]:
     """Values of w along a path of inputs, (n,), and their derivatives by the tables, (n, values).
 
-    ``now`` (input, w) and its derivatives ``grown`` (values,) are moved on.
+    ``now`` (input, w) and its ``derivatives`` (values,) are moved on.
     Where ``known`` (n,) is a number, the path goes on from it in place of w: the next value is then
     a prediction by one step alone.
     """
-    cells, columns = (tables.shape[1] - 3, tables.shape[2] - 3), tables.shape[2]
     jacobian, values = np.empty((path.size, tables.size)), np.empty(path.size)
-    u, w = now
+    grown = derivatives, np.zeros(tables.size), np.array([1.0, 0.0])
+    work = np.empty((4, 2), np.int64), np.empty((4, 2, 4))
     for k in range(path.size):
-        way = 1.0 if path[k] > u else -1.0
-        side = 0 if way > 0.0 else 1
-        while u != path[k]:
-            far = next_stop(grid, u, way)
-            far = way * min(way * far, way * path[k])
-            there = step(tables[side], grid, u, w, far)
-            length = far - u
-            i, t = _place(0.5 * (u + far), grid[0], grid[1], cells[0])
-            j, s = _place(0.5 * (w + there), grid[2], grid[3], cells[1])
-            along, across = _weights(t), _weights(s)
-            bend = 0.5 * length * _read(tables[side], i, j, along, _growth(s)) / grid[3]
-            grown *= (1.0 + bend) / (1.0 - bend)
-            first = side * tables[0].size + i * columns + j
-            for a in range(4):
-                for b in range(4):
-                    weight = length * along[a] * across[b] / (1.0 - bend)
-                    grown[first + a * columns + b] += weight
-            u, w = far, there
-        jacobian[k], values[k] = grown, w
+        _follow(tables, grid, now, grown, work, path[k])
+        _rescale(grown)
+        jacobian[k], values[k] = derivatives, now[1]
         if not np.isnan(known[k]):
-            w = known[k]
-            grown[:] = 0.0
-    now[0], now[1] = u, w
+            now[1] = known[k]
+            derivatives[:] = 0.0
     return values, jacobian
+
+
+@compiled
+def mean_sensitivities(
+    tables: Array, grid: Grid, now: Array, derivatives: Array, path: Array, block: int
+) -> Array:
+    """Derivatives of w by the tables, as ``sensitivities`` gives, averaged over blocks of a path.
+
+    The shape is (blocks, values).
+    """
+    mean, scales = np.zeros((path.size // block, tables.size)), np.array([1.0, 0.0])
+    work = np.empty((4, 2), np.int64), np.empty((4, 2, 4))
+    for k in range(mean.shape[0]):
+        grown = derivatives, mean[k], scales
+        for j in range(block):
+            _follow(tables, grid, now, grown, work, path[k * block + j])
+            scales[1] += scales[0]
+        _rescale(grown)
+        mean[k] /= block
+    return mean
+
+
+@compiled
+def _follow(tables: Array, grid: Grid, now: Array, grown: Scaled, work: Work, end: float) -> None:
+    """Move (input, w) and its derivatives to an input."""
+    u, w = now
+    way = 1.0 if end > u else -1.0
+    side = 0 if way > 0.0 else 1
+    while u != end:
+        far = next_stop(grid, u, way)
+        far = way * min(way * far, way * end)
+        w = _grow(tables, side, grid, (u, w, far), grown, work)
+        u = far
+    now[0], now[1] = u, w

@@ -1,0 +1,180 @@
+"""Steps of a fit: Levenberg's and Marquardt's, bent as the valley that they follow.
+
+The second derivative m'' of the model along a step v bends it by the geodesic acceleration
+
+    (H + λ D) a = -Jᵀ W m'',    δ = v + a / 2.
+
+Sources: K. Madsen, H. B. Nielsen and O. Tingleff, Methods for Non-Linear Least Squares Problems,
+DTU 2004, algorithm 3.16, for the damping λ; M. K. Transtrum and J. P. Sethna, arXiv:1201.5885,
+sections 3 and 4, for the acceleration.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.evidence import best_scales
+from afm_scan_ros.core.fit.parameters import Layout
+from afm_scan_ros.core.types import Array
+
+Mask: TypeAlias = NDArray[np.bool_]
+
+VIBRATION = ("lags", "modes")
+"""Groups of parameters of V, which can be fitted while the operator is held."""
+
+
+def settle(
+    fit: AxisFit, steps: int, groups: Sequence[str] = (), *, searching: bool = False
+) -> None:
+    """Take steps until the objective falls no more, weighing the records after each."""
+    for _ in range(steps):
+        before = fit.discrepancy
+        fell = step(fit, groups, searching=searching)
+        fell -= fit.cover(fell)
+        fit.weigh()
+        heavier = max(1.0, before / fit.discrepancy) ** 2
+        fit.remaining = heavier * abs(fit.remaining - fell)
+        if fell == 0.0 or fit.converged:
+            break
+
+
+def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -> float:
+    """Take a step of some groups of parameters, or of all; return how far the objective fell.
+
+    Where ``searching``, the scales of the greatest evidence are chosen first, if the last step
+    showed the objective to be as quadratic as that evidence takes it to be. A parameter that would
+    fall below its lowest value stays there for this step.
+    """
+    free = np.zeros(fit.layout.size, bool)
+    for name in groups or fit.layout.parts:
+        free[fit.layout.parts[name]] = True
+    held = not free[: fit.layout.parts["map"].stop].any()
+    matrix, right = fit.normal(with_operator=not held)
+    if searching and fit.quadratic:
+        fit.scales = best_scales(fit.layout, fit.scales, fit.theta, matrix, right)
+    precision, mean = fit.layout.prior(fit.scales, fit.theta)
+    right -= precision @ (fit.theta - mean)
+    whole = fit.layout.conditioned(matrix + precision)
+    metric = _metric(fit.layout, matrix, precision)
+    equations = _Equations(whole, right, free, held, metric)
+    return _descend(fit, _growing(fit, equations) if fit.grows else equations)
+
+
+def _metric(layout: Layout, matrix: Array, precision: Array) -> Array:
+    """Metric D of the damping: the diagonal of the normal equations, but for an operator's tables.
+
+    There most of it is the prior's precision, scaled to the same trace, so that smooth changes of
+    a table are damped less than those of single coefficients.
+    """
+    whole, alone = np.diag(np.diag(matrix + precision)), layout.settings.damped_alone
+    for name in layout.operator.parts:
+        part = layout.parts[name]
+        own, smooth = whole[part, part], precision[part, part]
+        scaled = np.trace(own) / np.trace(smooth) * smooth
+        whole[part, part] = alone * own + (1.0 - alone) * scaled
+    return whole
+
+
+def _growing(fit: AxisFit, equations: "_Equations") -> "_Equations":
+    """Add the conditions that the surface of plays grows, of where their moves lead."""
+    lowest, at = fit.layout.lowest() - fit.theta, fit.theta
+    for _ in range(fit.layout.settings.most_trials):
+        rows, lacks = fit.layout.lacking(at)
+        lacks = lacks + rows @ (at - fit.theta)
+        if len(lacks) == 0:
+            break
+        equations = equations.with_conditions(rows, lacks)
+        at = fit.theta + equations.move(0.0, equations.right, lowest)
+    return equations
+
+
+@frozen(eq=False)
+class _Equations:
+    """Normal equations with the prior: H is ``matrix``, g is ``right``.
+
+    ``free`` parameters move; ``held`` is whether none of them is the operator's. ``metric`` is D
+    of the damping, which conditions do not change. Conditions that the start meets are squares all
+    the same: ``unseen`` is what these add to the objective there.
+    """
+
+    matrix: Array
+    right: Array
+    free: Mask
+    held: bool
+    metric: Array
+    unseen: float = 0.0
+
+    def with_conditions(self, rows: Array, lacks: Array) -> "_Equations":
+        """Add half the squares of what lacks after a move: ``lacks`` less rows times move."""
+        matrix, right = self.matrix + rows.T @ rows, self.right + rows.T @ lacks
+        unseen = self.unseen + 0.5 * float(np.sum(np.minimum(lacks, 0.0) ** 2))
+        return evolve(self, matrix=matrix, right=right, unseen=unseen)
+
+    def foreseen(self, move: Array) -> float:
+        """By how much a move lowers the objective, were that quadratic."""
+        return float(move @ self.right - 0.5 * move @ self.matrix @ move) - self.unseen
+
+    def move(self, damping: float, right: Array, lowest: Array) -> Array:
+        """Return the move towards ``right`` under a damping, none below its lowest."""
+        damped = self.matrix + damping * self.metric
+        return bounded(damped, right, self.free, lowest)
+
+
+def _descend(fit: AxisFit, equations: _Equations) -> float:
+    """Try ever shorter steps until one descends; return how far."""
+    settings, start = fit.layout.settings, fit.theta
+    lowest, before = fit.layout.lowest() - start, fit.objective(start)
+    fit.remaining = equations.foreseen(equations.move(0.0, equations.right, lowest))
+    fit.quadratic, worse = False, 2.0
+    for _ in range(settings.most_trials):
+        move = equations.move(fit.damping, equations.right, lowest)
+        theta = start + _bent(fit, equations, move, lowest)
+        fell = before - fit.objective(theta)
+        if fell > 0.0:
+            foreseen = max(equations.foreseen(move), np.finfo(float).tiny)
+            share = min(fell / foreseen, 1.0)
+            better = max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
+            fit.damping = max(better * fit.damping, settings.least_damping)
+            fit.theta, fit.quadratic = theta, fell > 0.5 * fit.remaining
+            return fell
+        fit.damping, worse = worse * fit.damping, 2.0 * worse
+    return 0.0
+
+
+def _bent(fit: AxisFit, equations: _Equations, move: Array, lowest: Array) -> Array:
+    """Return a move with its geodesic acceleration, if that is shorter than the move."""
+    settings = fit.layout.settings
+    try:
+        right = fit.bent(move, settings.bend_step, with_operator=not equations.held)
+    except (InputError, ScanError):  # the map behind the operator turns back, or it overflows
+        return move
+    acceleration = equations.move(fit.damping, right, 2.0 * (lowest - move))
+    sizes = [np.sqrt(each @ equations.metric @ each) for each in (acceleration, move)]
+    return move + 0.5 * acceleration if sizes[0] < settings.most_bend * sizes[1] else move
+
+
+def bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
+    """Move of the free parameters, none below its lowest, that lowers ½ mᵀHm - gᵀm most.
+
+    All that would pass their bound are held there, and all held that pull away from it are let go,
+    while these become fewer; then one at a time, so that this ends.
+    Source: J. Kim and H. Park, SIAM J. Sci. Comput. 33 (2011) 3261, section 3.
+    """
+    move, loose, fewest = np.zeros(len(right)), free.copy(), len(right) + 1
+    for _ in range(3 * len(right)):
+        held = free & ~loose
+        move[held] = lowest[held]
+        pull = right[loose] - matrix[np.ix_(loose, held)] @ move[held]
+        move[loose] = np.linalg.solve(matrix[np.ix_(loose, loose)], pull)
+        wrong = np.flatnonzero((loose & (move < lowest)) | (held & (right - matrix @ move > 0.0)))
+        if len(wrong) == 0:
+            break
+        exchanged = wrong if len(wrong) < fewest else wrong[-1:]
+        fewest = min(fewest, len(wrong))
+        loose[exchanged] = ~loose[exchanged]
+    return np.where(free, np.maximum(move, lowest), 0.0)

@@ -1,0 +1,108 @@
+"""Steps of a fit: bounded, bent, and none that undoes another."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import optimize
+
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.fit.descent import _metric, bounded, settle, step
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.plays import Plays as PlayBank
+from afm_scan_ros.core.fit.sensitivity import simulate
+from helpers.fit_cases import (
+    DAMPING,
+    FREQUENCY,
+    GAIN,
+    LIMIT,
+    PERIOD,
+    SETTINGS,
+    displaced,
+    levels,
+    of_plays,
+    of_plays_alone,
+    signals,
+)
+
+
+@given(seed=st.integers(0, 10_000), size=st.integers(2, 40))
+def test_a_bounded_move_is_that_of_bounded_least_squares(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns, data = rng.standard_normal((size + 5, size)), rng.standard_normal(size + 5)
+    lowest = np.where(rng.random(size) < 0.7, -0.1 * rng.random(size), -np.inf)
+    free = rng.random(size) < 0.9
+    move = bounded(columns.T @ columns, columns.T @ data, free, lowest)
+    ends = np.where(free, lowest, -1e-12), np.where(free, np.inf, 1e-12)
+    expected = optimize.lsq_linear(columns, data, ends, method="bvls", tol=1e-14).x
+    np.testing.assert_allclose(move, expected, atol=1e-6)
+
+
+def test_a_fit_that_overflows_says_so() -> None:
+    drive = levels(4, 6, 300)
+    fit = AxisFit(*of_plays_alone(drive, GAIN * drive))
+    fit.gain = 1e200
+    with pytest.raises(ScanError, match="diverged"):
+        fit.normal(with_operator=True)
+
+
+def test_steps_follow_the_curve_of_a_valley() -> None:
+    """The map behind plays makes one; of straight steps the third still brings 20 nat."""
+    layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
+    layout, theta = layout.with_mode(layout.start(), (2.0 * np.pi * FREQUENCY, DAMPING, 1.0, 0.0))
+    drive = levels(2, 40, 80)
+    fit = AxisFit(layout, [signals(drive, displaced(of_plays, drive), 1)], 1e-6, theta, 1e-4)
+    settle(fit, 4, [name for name in layout.parts if name != "map"])
+    fell = [step(fit) for _ in range(3)]
+    assert fell[0] > 100.0
+    assert fell[2] < 0.1
+
+
+def test_no_mode_becomes_broader_than_those_of_stages() -> None:
+    operator = PlayBank(-LIMIT, LIMIT)
+    layout = layout_of(operator, 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
+    sharp, broad = 0.03, SETTINGS.greatest_damping
+    for damping, inside in ((sharp, True), (0.9 * broad, True), (1.1 * broad, False)):
+        mode = 2.0 * np.pi * FREQUENCY, damping, 0.8, 0.1
+        wider, theta = layout.with_mode(layout.start(), mode)
+        assert wider.of_modes(theta) == [pytest.approx(mode)]
+        part = wider.parts["modes"]
+        assert bool((theta >= wider.lowest())[part].all()) is inside
+
+
+def test_tables_stay_where_others_would_lose_what_a_step_gained() -> None:
+    """The states reach beyond the cells, and the slopes bend more than wider cells can."""
+    drive, rng = levels(2, 40, 80), np.random.default_rng(5)
+    operator = OneState(-LIMIT, LIMIT, (-0.1, 0.1))
+    layout = layout_of(operator, 1.0, PERIOD, SETTINGS)
+    theta = layout.start()
+    theta[layout.parts["slopes"]] = rng.uniform(-0.8, 0.8, operator.unbent().size)
+    moved = GAIN * simulate(layout, theta, signals(drive, drive, 1)).response.output
+    fit = AxisFit(layout, [signals(drive, moved, 1)], GAIN, theta, 1e-5)
+    before = fit.objective(theta)
+    assert fit.cover(1.0) == 0.0
+    assert fit.layout is layout
+    assert fit.theta is theta
+    lost = fit.cover(np.inf)
+    assert lost > 1.0
+    assert fit.objective(fit.theta) == pytest.approx(before + lost)
+    assert fit.layout.operator != operator
+
+
+def test_a_smooth_change_of_a_table_is_damped_less_than_one_of_single_coefficients() -> None:
+    """The metric of the damping has the trace of the diagonal all the same."""
+    drive = levels(3, 6, 200)
+    operator = OneState(-LIMIT, LIMIT, (-0.2, 0.2), SETTINGS)
+    layout = layout_of(operator, PERIOD * len(drive), PERIOD, SETTINGS)
+    fit = AxisFit(layout, [signals(drive, displaced(of_plays, drive), 1)], GAIN, layout.start())
+    precision, _ = layout.prior(fit.scales, fit.theta)
+    matrix, _ = fit.normal(with_operator=True)
+    metric, part = _metric(layout, matrix, precision), layout.parts["slopes"]
+    assert np.trace(metric) == pytest.approx(np.trace(matrix + precision))
+    smooth = np.ones(part.stop - part.start)
+    rough = smooth * (-1.0) ** np.arange(len(smooth))
+    own = np.diag(matrix + precision)[part].sum()  # of either, were the diagonal the metric
+    assert smooth @ metric[part, part] @ smooth < 0.1 * own < own
+    assert rough @ metric[part, part] @ rough > own

@@ -1,0 +1,70 @@
+"""Modes in the residuals of a fit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.modes import best_mode, clear, large
+from helpers.fit_cases import (
+    CREEP,
+    DAMPING,
+    FREQUENCY,
+    GAIN,
+    PERIOD,
+    SETTINGS,
+    displaced,
+    levels,
+    of_plays,
+    of_plays_alone,
+    record,
+)
+
+
+def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
+    """A straight line through them has another, as the phase turns."""
+    rng = np.random.default_rng(8)
+    lines = np.arange(400, 900)
+    spectrum = np.zeros(10_001, complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    wave = np.tile(np.fft.irfft(spectrum, 20_000), 2)
+    drive = np.concatenate([[0.0], wave / np.abs(wave).max(), [0.0]])
+    moved = displaced(lambda volts: volts, drive)
+    layout, given, _, theta = of_plays_alone(drive, moved)
+    line = float(drive @ moved / (drive @ drive))
+    fit = AxisFit(layout, given, line, theta)
+    fit.weigh()
+    found = best_mode(fit, large)
+    assert found is not None
+    assert abs(line / GAIN - 1.0) > 0.5
+    assert line * found.gain == pytest.approx(GAIN * (1.0 + CREEP[0]), rel=0.15)
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+
+
+def test_a_mode_is_seen_beside_loops_that_are_not_fitted() -> None:
+    """Of waves that ride on triangles a straight line leaves loops ten times as large."""
+    seconds = PERIOD * np.arange(40_000)
+    swept = signal.chirp(seconds, 60.0, seconds[-1], 900.0)
+    triangle = 3.0 * signal.sawtooth(2.0 * np.pi * seconds + 0.5 * np.pi, 0.5)
+    drive = np.minimum(seconds / 0.1, 1.0) * (triangle + 0.05 * swept)
+    layout, given, _, theta = of_plays_alone(drive, record(of_plays, drive).displacement[:, 0])
+    fit = AxisFit(layout, given, GAIN, theta)
+    fit.weigh()
+    found = best_mode(fit, clear)
+    assert found is not None
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+    assert found.mode[1] == pytest.approx(DAMPING, rel=0.4)
+    assert found.share > SETTINGS.mode_share
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=10)
+def test_noise_has_no_mode(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    drive = levels(seed, 20, 400)
+    moved = GAIN * drive + 1e-9 * rng.standard_normal(len(drive))
+    fit = AxisFit(*of_plays_alone(drive, moved)[:2], GAIN, of_plays_alone(drive, moved)[3])
+    fit.weigh()
+    assert best_mode(fit, clear) is None

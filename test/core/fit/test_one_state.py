@@ -1,0 +1,44 @@
+"""The operator of one state: what it follows, starts from and is on other cells."""
+
+import numpy as np
+import pytest
+
+from afm_scan_ros.core.fit.one_state import OneState
+from helpers.fit_cases import LIMIT, OPERATORS, applied, levels, of_duhem
+
+
+@pytest.mark.parametrize("family", ["duhem", "bouc_wen"])
+def test_one_state_follows_scanners_without_wiping_out(family: str) -> None:
+    """Equation error alone is close; the fit then goes on from it."""
+    path = levels(2, 60, 300)
+    output = applied(OPERATORS[family], path)
+    low, high = (output - path).min(), (output - path).max()
+    operator = OneState(-LIMIT, LIMIT, (low - 0.05, high + 0.05))
+    starts = operator.started([(path, output)])
+    missed = [np.std(operator.output(one, path, rested=True) - output) for one in starts]
+    assert min(missed) < 2e-3 * np.ptp(output)
+
+
+def test_one_state_starts_from_a_path_that_it_makes() -> None:
+    """Slopes linear in u and w are splines exactly, whatever the samples' distance is."""
+    path = levels(2, 60, 300)
+    output = of_duhem(path)
+    low, high = (output - path).min(), (output - path).max()
+    operator = OneState(-LIMIT, LIMIT, (low - 0.05, high + 0.05))
+    starts = operator.started([(path, output)])
+    missed = [np.std(operator.output(one, path, rested=True) - output) for one in starts]
+    assert min(missed) < 1e-6 * np.ptp(output)
+
+
+def test_slopes_stay_the_same_on_cells_that_reach_further() -> None:
+    path = levels(2, 60, 300)
+    output = applied(OPERATORS["duhem"], path)
+    operator = OneState(-LIMIT, LIMIT, (-0.3, 0.3))
+    theta = operator.started([(path, output)])[5]
+    before = operator.output(theta, path, rested=True)
+    wider, moved = operator.covering(theta, np.array([-0.36, 0.4]))
+    apart = wider.output(moved, path, rested=True) - before
+    assert np.std(apart) < 2e-3 * np.ptp(before)
+    assert wider.widths[0] < -0.36
+    assert wider.widths[1] > 0.4
+    assert wider.covering(moved, np.array([-0.36, 0.4]))[0] is wider

@@ -1,0 +1,89 @@
+"""Plays as an operator and as the Everett surface of a model."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.descent import settle
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.growth import Growth
+from afm_scan_ros.core.fit.model_of_fit import from_rest
+from afm_scan_ros.core.fit.plays import Plays as PlayBank
+from afm_scan_ros.core.types import Array
+from helpers.fit_cases import GAIN, LIMIT, SETTINGS, levels, of_plays_alone
+
+
+@pytest.fixture(scope="module")
+def drive() -> Array:
+    return levels(1, 14, 600)
+
+
+def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
+    rng = np.random.default_rng(5)
+    bank = PlayBank(-LIMIT, LIMIT)
+    plays, terms = bank.parts["density"], bank.parts["correction"]
+    density = np.concatenate([[0.8], 0.3 * rng.random(plays - 1)])
+    theta = np.concatenate([density, 0.02 * rng.standard_normal(terms)])
+    surface = bank.surface(theta)
+    model = Preisach(surface)
+    of_model = model.apply(model.at_rest(), drive)[1]
+    of_plays = bank.output(theta, drive, rested=True)
+    apart = of_model - (of_plays - bank.output(theta, np.zeros(1), rested=True))
+    assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 5.0), (-1.0, 4.0), (-3.0, 3.0)])
+def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float) -> None:
+    """Also where plays move once from rest and never again: what they moved by is an offset."""
+    bank = PlayBank(low, high)
+    theta = bank.unbent()
+    theta[: bank.parts["density"]] = np.linspace(0.9, 0.3, bank.parts["density"])
+    surface, _ = from_rest(bank.surface(theta), None)
+    model = Preisach(surface)
+    assert model.at_rest().now[1] == pytest.approx(0.0, abs=1e-12)
+    path = np.interp(np.arange(700), np.arange(0, 701, 100), [0, high, low, high, 1, 3, 0.5, 2])
+    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, rested=True)
+    assert np.ptp(apart[200:]) < 1e-3 * (high - low)
+
+
+@given(seed=st.integers(0, 10_000), low=st.sampled_from([-LIMIT, 0.0]))
+@settings(max_examples=10)
+def test_conditions_tell_where_a_surface_does_not_grow(seed: int, low: float) -> None:
+    """They are linear in the weights, and none fails where the model has an inverse."""
+    rng, plays = np.random.default_rng(seed), PlayBank(low, LIMIT)
+    growth, theta = Growth(plays), plays.unbent()
+    theta[1:] = rng.normal(0.0, 10.0 ** rng.uniform(-2.0, 0.5), theta.size - 1)
+    rows, lacks = growth.lacking(theta)
+    if len(lacks) == 0:
+        plays.surface(theta)
+        return
+    least = SETTINGS.least_slope / SETTINGS.slope_tolerance
+    if lacks.max() > 1.01 * least:
+        with pytest.raises(InputError, match="does not grow"):
+            plays.surface(theta)
+    move = 1e-9 * rng.standard_normal(theta.size)
+    _, moved = growth.lacking(theta + move)
+    np.testing.assert_allclose(moved - lacks, -rows @ move, atol=1e-6 * least)
+
+
+def test_plays_that_no_surface_has_are_held_to_one() -> None:
+    """A response that falls as the drive goes on rising after each turn."""
+    drive = levels(2, 40, 80)
+    operator = PlayBank(-LIMIT, LIMIT)
+    theta = operator.unbent()
+    theta[1 : len(operator.thresholds)] = 0.5
+    theta[12:20] = -12.0
+    with pytest.raises(InputError, match="does not grow"):
+        operator.surface(theta)
+    moved = GAIN * operator.output(theta, drive, rested=True)
+    fit = AxisFit(*of_plays_alone(drive, moved))
+    settle(fit, 20, ("density", "correction"))
+    with pytest.raises(InputError, match="does not grow"):
+        operator.surface(fit.layout.of_operator(fit.theta))
+    fit.grows = True
+    settle(fit, 20, ("density", "correction"))
+    found = operator.surface(fit.layout.of_operator(fit.theta))
+    assert found.output_upper > found.output_lower

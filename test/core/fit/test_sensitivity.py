@@ -1,0 +1,130 @@
+"""Derivatives of a fit: of a simulation, of its misfit, and of the operator of one state."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.effects.hysteresis.branches import mean_sensitivities, sensitivities
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.parameters import Layout, layout_of
+from afm_scan_ros.core.fit.plays import Plays as PlayBank
+from afm_scan_ros.core.fit.sensitivity import jacobian, pulled, simulate
+from afm_scan_ros.core.fit.signals import (
+    averaged,
+)
+from afm_scan_ros.core.types import Array
+from helpers.fit_cases import (
+    DAMPING,
+    FREQUENCY,
+    LIMIT,
+    PERIOD,
+    SETTINGS,
+    displaced,
+    levels,
+    of_plays,
+    of_plays_alone,
+    signals,
+)
+
+
+@pytest.fixture(scope="module")
+def drive() -> Array:
+    return levels(1, 14, 600)
+
+
+KINDS = list(product(("plays", "one state"), (1, 4)))
+
+
+def at_some_theta(kind: str) -> tuple[Layout, Array, np.random.Generator]:
+    rng = np.random.default_rng(3)
+    operator = PlayBank(-LIMIT, LIMIT) if kind == "plays" else OneState(-LIMIT, LIMIT, (-1.5, 1.5))
+    layout = layout_of(operator, 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
+    layout, theta = layout.with_mode(layout.start(), (2.0 * np.pi * FREQUENCY, DAMPING, 0.8, 0.1))
+    for name, size in {"density": 0.3, "correction": 0.05, "slopes": 0.1, "map": 0.05}.items():
+        if name in layout.parts:
+            theta[layout.parts[name]] += size * rng.standard_normal(theta[layout.parts[name]].size)
+    theta[layout.parts["creep"]] = 0.02 * rng.random(theta[layout.parts["creep"]].size)
+    return layout, theta, rng
+
+
+@pytest.mark.parametrize(("kind", "block"), KINDS)
+def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int) -> None:
+    layout, theta, rng = at_some_theta(kind)
+    one, operator = signals(drive, 1e-6 * drive, block), layout.operator
+    pieces = operator.pieces(layout.of_operator(theta), drive, block, rested=True)
+    of_pieces = jacobian(layout, theta, one, simulate(layout, theta, one), pieces)
+    found = np.concatenate([piece for _, piece in of_pieces])
+    for place in rng.choice(layout.size, 60, replace=False):
+        step = 1e-5 * np.eye(layout.size)[place]
+        up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
+        slope = (up.response.output - down.response.output)[one.used] / 2e-5
+        motion = float(np.linalg.norm(slope)) + 1e-6
+        close = 0.002 if block == 1 else 0.06  # blocks hold the input of the filters
+        assert np.linalg.norm(slope - found[:, place]) < close * motion + 1e-5, place
+
+
+@pytest.mark.parametrize("rested", [True, False])
+@pytest.mark.parametrize(("kind", "block"), KINDS)
+def test_residuals_are_pulled_back_by_the_same_jacobian(
+    drive: Array, kind: str, block: int, *, rested: bool
+) -> None:
+    layout, theta, rng = at_some_theta(kind)
+    one = evolve(signals(drive, 1e-6 * drive, block), rested=rested)
+    at = layout, theta, one, simulate(layout, theta, one)
+    given = layout.of_operator(theta), drive, block
+    pieces = list(layout.operator.pieces(*given, rested=rested))
+    whole = np.concatenate([piece for _, piece in jacobian(*at, pieces)])
+    pull = rng.standard_normal(len(whole))
+    expected = pull @ whole
+    found = pulled(*at, pieces, pull)  # those of plays are of single precision
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+
+
+def test_misfit_falls_as_the_normal_equations_say() -> None:
+    """Also where what is free in a record has a prior that counts: waves of under a period."""
+    rng = np.random.default_rng(5)
+    drive = levels(4, 6, 300)
+    moved = displaced(of_plays, drive) + 0.3e-6 * rng.standard_normal(len(drive))
+    layout, given, gain, theta = of_plays_alone(drive, moved)
+    seconds = PERIOD * len(drive)
+    given = [evolve(one, tones=(0.3 / seconds, 0.9 / seconds), rested=False) for one in given]
+    fit = AxisFit(layout, given, gain, theta)
+    fit.weigh()
+    right = fit.normal(with_operator=True)[1]
+    for place in rng.choice(layout.parts["density"].stop, 30, replace=False):
+        step = 1e-4 * np.eye(layout.size)[place]
+        slope = (fit.misfit(theta - step) - fit.misfit(theta + step)) / 2e-4
+        assert slope == pytest.approx(right[place], rel=0.02, abs=1e-3 * np.abs(right).max())
+
+
+@pytest.mark.parametrize("block", [1, 4])
+def test_sensitivities_of_one_state_are_those_of_its_steps(block: int) -> None:
+    """Also of slopes so steep that a step crosses many cells, as fits pass through."""
+    rng = np.random.default_rng(4)
+    operator, path = OneState(-LIMIT, LIMIT, (-0.2, 0.2)), levels(3, 20, 200)
+    theta = 2.0 * rng.random(operator.parts["slopes"]) - 0.5
+    found = np.concatenate(list(operator.pieces(theta, path, block, rested=True)))
+    for place in rng.choice(theta.size, 40, replace=False):
+        step = 1e-6 * np.eye(theta.size)[place]
+        up, down = (operator.output(theta + way * step, path, rested=True) for way in (1.0, -1.0))
+        slope = averaged(up - down, block) / 2e-6
+        np.testing.assert_allclose(found[:, place], slope, atol=1e-3 * np.abs(slope).max() + 1e-7)
+
+
+@pytest.mark.parametrize("fading", [8.0, -0.5])
+def test_means_of_sensitivities_hold_however_fast_these_fade_or_grow(fading: float) -> None:
+    """They share a scale within a block, which would take all digits of a sum with it."""
+    operator, path = OneState(-LIMIT, LIMIT, (-0.2, 0.2)), levels(3, 20, 200)
+    states = np.linspace(-0.2, 0.2, operator.shape[2])
+    ways = np.array([-1.0, 1.0])[:, np.newaxis, np.newaxis]
+    tables = fading * ways * np.ones((1, operator.shape[1], 1)) * states
+    now, grown = np.zeros(2), np.zeros(tables.size)
+    unknown = np.full(len(path), np.nan)
+    each = sensitivities(tables, operator.cells, now.copy(), grown.copy(), path, unknown)[1]
+    means = mean_sensitivities(tables, operator.cells, now, grown, path, 100)
+    expected = each[: 100 * len(means)].reshape(len(means), 100, -1).mean(axis=1)
+    largest = np.abs(expected).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(means / largest, expected / largest, atol=1e-11)

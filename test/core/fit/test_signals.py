@@ -1,0 +1,46 @@
+"""A record as the fit takes it: its noise, its blocks, and from where on it counts."""
+
+import numpy as np
+import pytest
+
+import afm_scan_ros as afm
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.signals import (
+    known_from,
+    longest_block,
+    noise_of,
+)
+from helpers.fit_cases import (
+    GAIN,
+    PERIOD,
+    SETTINGS,
+)
+
+
+def test_noise_is_that_of_third_differences_whatever_moves_slowly() -> None:
+    rng = np.random.default_rng(1)
+    slow = np.sin(np.linspace(0.0, 20.0, 50_000))
+    assert noise_of(slow + 1e-3 * rng.standard_normal(len(slow))) == pytest.approx(1e-3, rel=0.03)
+
+
+def test_blocks_are_as_long_as_nothing_turns_within_them() -> None:
+    rng = np.random.default_rng(1)
+    slow = np.sin(np.linspace(0.0, 60.0, 100_000))
+    moved = slow + 1e-3 * rng.standard_normal(len(slow))
+    long = longest_block(slow, moved, 1e-3, SETTINGS)
+    short = longest_block(np.sin(np.linspace(0.0, 600.0, 100_000)), moved, 1e-3, SETTINGS)
+    assert long >= 32 > short
+
+
+def test_memory_is_known_from_rest_or_from_both_ends() -> None:
+    path = np.array([0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
+    assert known_from(path, depolarised=True) == 0
+    assert known_from(path, depolarised=False) == 3
+
+
+def test_a_record_whose_memory_is_never_known_is_refused_by_name() -> None:
+    rise = np.linspace(0.0, 1.0, 1000)
+    record = afm.Record(rise, GAIN * rise, PERIOD, name="rise")
+    with pytest.raises(InputError, match="rise: its drive reaches the second of its ends only"):
+        fit_axis([record], "x")
