@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.cli.execution import how_scans_run
 from afm_scan_ros.cli.options import CONFIG, FOLDER
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
@@ -72,7 +73,8 @@ def demo(out: Path) -> None:
     The scanner is config/plant.yaml. The model is config/model.yaml, identified from simulated
     records of that scanner.
     """
-    every = list(cases())
+    every, ran = list(cases()), how_scans_run()
+    click.echo(f"{len(every)} scans {ran}", err=True)
     done: Scanned = {}
     for number, case in enumerate(every, 1):
         click.echo(f"scan {number} of {len(every)}: {case.line_rate:g} Hz, {case.name}", err=True)
@@ -84,7 +86,7 @@ def demo(out: Path) -> None:
     figures = {rate: comparison_figure(*_views(rate, out)) for rate in LINE_RATES}
     for rate, figure in figures.items():
         save(figure, out / f"comparison_{rate:g}hz.png")
-    page = report(tables, figures, (IMAGED[0], _images(out)), next_commands(out))
+    page = report(tables, figures, (IMAGED[0], _images(out)), next_commands(out), ran)
     write_text(out / "report.html", page)
     click.echo(f"Report: {out / 'report.html'}. Bags, figures and JSON are in the same folder.")
 

@@ -59,6 +59,14 @@ def nodes_can_run() -> bool:
     return not lacking
 
 
+def how_scans_run() -> str:
+    """Return what executes scans, to be said after 'each scan ran'."""
+    driver = "and the scanner's driver in another"
+    if nodes_can_run():
+        return f"by nodes of ROS 2, a process each, {driver}"
+    return f"without ROS 2, as a pipeline in one process {driver}"
+
+
 def _scan(order: orders.ScanOrder) -> None:
     """Scan in this process."""
     files, spec = order.files, order.spec

@@ -167,10 +167,12 @@ def report(
     figures: Mapping[float, Figure],
     imaged: tuple[DemoScan, Images],
     commands: Iterable[tuple[str, str]],
+    ran: str,
 ) -> str:
     """Return everything as one HTML page that needs nothing else.
 
-    ``commands`` are what to do next: a purpose and the command line that serves it.
+    ``commands`` are what to do next: a purpose and the command line that serves it. ``ran`` says
+    how the scans ran.
     """
     scan, images = imaged
     return html.page(
@@ -181,6 +183,7 @@ def report(
         errors=images.errors,
         figures={rate: html.png(figure) for rate, figure in figures.items()},
         commands=commands,
+        ran=ran,
     )
 
 

@@ -54,6 +54,14 @@ def found(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[str]]:
     execution.nodes_can_run.cache_clear()
 
 
+def test_a_report_says_what_executed_its_scans(found: set[str]) -> None:
+    driver = "and the scanner's driver in another"
+    assert execution.how_scans_run() == f"without ROS 2, as a pipeline in one process {driver}"
+    found |= {"rclpy", "afm_scan_ros.msg"}
+    execution.nodes_can_run.cache_clear()
+    assert execution.how_scans_run() == f"by nodes of ROS 2, a process each, {driver}"
+
+
 @pytest.fixture
 def spec(tmp_path: Path) -> Path:
     path = tmp_path / "scan.yaml"
