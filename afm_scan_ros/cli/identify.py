@@ -21,8 +21,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.identification.together import FittedAxis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
@@ -156,20 +156,20 @@ def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Re
 
 
 def _show(found: Identification) -> None:
-    for axis, joint in found.joint.items():
-        _show_joint(axis, joint)
+    for axis, fitted in found.together.items():
+        _show_together(axis, fitted)
     for axis, identified in found.axes.items():
         _show_axis(axis, identified)
 
 
-def _show_joint(axis: str, found: JointAxis) -> None:
+def _show_together(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
         say(f"{axis}: {effect}: {status_text(status)}")
-    if found.joint is not None:
-        say(
-            f"   displacement, fitted {1e9 * found.joint.fitted:.1f} nm rms, held out"
-            f" {1e9 * found.joint.held_out:.1f} nm rms"
-        )
+    say(
+        f"   hysteresis by {found.operator}; the model's error is {found.discrepancy:.2%} of motion"
+    )
+    for record, left in found.left.items():
+        say(f"   {record}: {1e9 * left:.3g} nm rms left")
     _warn((*left_out({axis: found.model.effects}), *map(finding_text, found.warnings)))
 
 

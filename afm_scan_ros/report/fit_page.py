@@ -25,7 +25,7 @@ from afm_scan_ros.report.table import Rows
 def fit_page(found: Identification) -> str:
     """Return the fit report as a self-contained HTML page."""
     warned = {name: axis.warnings for name, axis in found.axes.items()}
-    warned |= {name: axis.warnings for name, axis in found.joint.items()}
+    warned |= {name: axis.warnings for name, axis in found.together.items()}
     known = [
         (f"{axis}, {effect}", status_text(status), intervals_text(status))
         for axis in found.model.axes
@@ -35,7 +35,7 @@ def fit_page(found: Identification) -> str:
         "identification.html",
         findings=[f"{name}: {finding_text(one)}" for name in warned for one in warned[name]],
         known=Rows(("", "known, and where it holds", "95 % intervals"), known),
-        joint=found.joint,
+        together=found.together,
         axes=found.axes,
         pictures=_pictures(found) if found.axes else {},
         records=RECORDS,

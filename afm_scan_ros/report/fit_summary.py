@@ -11,8 +11,8 @@ from afm_scan_ros.core.identification import findings as found
 from afm_scan_ros.core.identification.creep.fit import CreepFit, half_width
 from afm_scan_ros.core.identification.fit_report import AxisReport, OperatorChoice
 from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
-from afm_scan_ros.core.identification.joint.axis import JointAxis
 from afm_scan_ros.core.identification.records.recording import Misfit
+from afm_scan_ros.core.identification.together import FittedAxis
 from afm_scan_ros.core.identification.vibration.line_response import LOCAL
 from afm_scan_ros.core.identification.vibration.rational_fit import RationalFit
 from afm_scan_ros.core.identification.vibration.structure import OrderChoice
@@ -58,9 +58,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     " of each effect that is stated as unknown.",
     found.NotValidated: "All records were fitted, so the model's error is not known."
     " Give a validation record: other sizes and rates than those that were fitted.",
-    found.MissingTurns: "No curve of {record} turns between {below:.4g} and {above:.4g} V, so all"
-    " were fitted coarsely, as any motion is. Record reversal curves that turn at many levels, from"
-    " saturation to saturation.",
+    found.NotConverged: "The fit has not converged: the likelihood may still grow by"
+    " {remaining:.3g} nat, so the intervals do not hold. Give further records, of other sizes and"
+    " rates.",
     found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
     " {seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state that.",
 }
@@ -140,8 +140,8 @@ def _(one: found.ResponseMisfit) -> str:
 def _(one: found.Hum) -> str:
     lines = ", ".join(f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in one.lines)
     return (
-        f"The {one.record} record holds a periodic disturbance: {lines}. It was taken off before"
-        " the fit. Find its source, or keep it off the sensor and the amplifier."
+        f"The {one.record} record holds a periodic disturbance: {lines}. It is no part of the"
+        " model. Find its source, or keep it off the sensor and the amplifier."
     )
 
 
@@ -208,18 +208,17 @@ def fit_summary(identification: Identification) -> dict[str, Any]:
     leaves open is null.
     """
     full = {name: _axis(axis) for name, axis in identification.axes.items()}
-    return full | {name: joint_summary(axis) for name, axis in identification.joint.items()}
+    return full | {name: together_summary(axis) for name, axis in identification.together.items()}
 
 
-def joint_summary(found: JointAxis) -> dict[str, Any]:
+def together_summary(found: FittedAxis) -> dict[str, Any]:
     """Return the figures of an axis whose records were fitted together."""
     known = found.validation and _model_discrepancy(found.validation.model_discrepancy)
     return {
-        "records": {each.name: each.kind or "motion" for each in found.records},
+        "records": {name: {"left_rms_m": left} for name, left in found.left.items()},
+        "operator": found.operator,
+        "discrepancy_over_motion": found.discrepancy,
         "effects": asdict(found.model.effects, value_serializer=_plain),
-        "fitted_rms_m": found.joint and found.joint.fitted,
-        "held_out_rms_m": found.joint and found.joint.held_out,
-        "smoothing": found.joint and found.joint.smoothing,
         "model_discrepancy": known,
         "warnings": [finding_text(finding) for finding in found.warnings],
     }

@@ -18,9 +18,9 @@ from afm_scan_ros.core.identification.findings import (
     InexactInverse,
     LowCoherence,
     MisfitCause,
-    MissingTurns,
     NarrowBand,
     NegativeCreepGain,
+    NotConverged,
     NotValidated,
     OpenLoops,
     ResponseMisfit,
@@ -83,7 +83,7 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
         "4 nm at 150.18",
     ),
     NotValidated(): ("error is not known", "validation record"),
-    MissingTurns("curves", -0.3, 1.0): ("No curve of curves", "-0.3 and 1 V", "Record reversal"),
+    NotConverged(12.5): ("has not converged", "12.5 nat", "further records"),
     UnknownStart("scan", 0.25): ("start of scan", "0.25 s", "Depolarise"),
 }
 

@@ -28,8 +28,8 @@ from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.axis import AnyRecord, error_from_start
-from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.identification.validation import validate_from
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -256,7 +256,7 @@ def with_healthy(model: ScannerModel, healthy: Sequence[Record]) -> ScannerModel
     """
     for name in model.axes:
         axis = model.axis(name)
-        errors = [error_from_start(axis, _record(one, name)) for one in _driving(healthy, name)]
+        errors = [_error(axis, one, name) for one in _driving(healthy, name)]
         model = evolve(model, **{name: axis.also_known(errors)})
     return model
 
@@ -283,6 +283,7 @@ def _driving(healthy: Sequence[Record], axis: str) -> list[Record]:
     return [one for one in healthy if axis in one.axes and np.ptp(one.signals(axis)[0])]
 
 
-def _record(one: Record, axis: str) -> AnyRecord:
+def _error(model: AxisModel, one: Record, axis: str) -> ModelDiscrepancy:
+    """Return the error on a whole record, that of an initial state not known among it."""
     signals = AxisRecord.of(one, axis)
-    return AnyRecord(f"healthy: {one.name}", None, signals, one.depolarised)
+    return validate_from(model, signals, f"healthy: {one.name}", 0).model_discrepancy

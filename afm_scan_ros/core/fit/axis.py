@@ -8,6 +8,7 @@ from attrs import evolve
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.descent import VIBRATION, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.likeness import refuse_unlike
 from afm_scan_ros.core.fit.modes import FoundMode, best_mode, clear, large
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
@@ -40,16 +41,18 @@ def fit_axis(
     Returns
     -------
     AxisFit
-        Its operator is the one of two, plays or one state, of the greater evidence.
+        Its operator is plays where these leave nothing but noise, or else that of plays and one
+        state which has the greater evidence.
 
     Raises
     ------
     InputError
-        Where no record moves, and for a record whose memory is never known.
+        Where no record moves, for a record whose memory is never known, and for one that is of
+        another scanner than the others or has its columns exchanged.
     ScanError
         Where the fit diverges.
     """
-    fit = _first(records, axis, settings)
+    fit = started(records, axis, settings)
     for record in fit.records:
         if record.first:
             progress(
@@ -60,9 +63,9 @@ def fit_axis(
     if found := _first_mode(fit):
         fit.gain *= found.gain
         settle(fit, settings.most_steps, VIBRATION)
+    refuse_unlike(fit)
     progress("fitting the hysteresis by plays")
     _fit_plays(fit)
-    progress("fitting the hysteresis by one state")
     fit = _better(fit, progress)
     while True:
         settle(fit, settings.most_steps, searching=True)
@@ -96,7 +99,14 @@ def _fit_plays(fit: AxisFit) -> None:
 
 
 def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
-    """Return the fit of the greater evidence; one state that diverges is none of the scanner's."""
+    """Return the fit of the greater evidence; one state that diverges is none of the scanner's.
+
+    Where plays leave nothing but the sensor's noise, no other operator can be seen to do better.
+    """
+    if plays.at_noise:
+        progress("plays leave nothing but noise")
+        return plays
+    progress("fitting the hysteresis by one state")
     try:
         other = with_one_state(plays)
         margin = _margin(plays, other)
@@ -125,8 +135,8 @@ def _margin(one: AxisFit, other: AxisFit) -> float:
     return margin
 
 
-def _first(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:
-    """No hysteresis, creep or vibration, and the gain of a straight line."""
+def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:
+    """Return a fit of no hysteresis, creep or vibration, and the gain of a straight line."""
     given = [record.axis(axis) for record in records if axis in record.axes]
     drives = [record.drive[:, 0] for record in given]
     ends = min(map(np.min, drives), default=0.0), max(map(np.max, drives), default=0.0)

@@ -62,6 +62,13 @@ class AxisFit:
         """Whether the parameters were within a third of their standard errors in the mean."""
         return self.remaining < self.layout.settings.converged * self.layout.size
 
+    @property
+    def at_noise(self) -> bool:
+        """Whether the discrepancy is a small part of what each record varies by."""
+        each = [(one, self.variance(one)) for one in self.records]
+        shares = [(self.discrepancy * one.motion) ** 2 / whole for one, whole in each]
+        return max(shares) < self.layout.settings.lost
+
     def variance(self, record: Signals) -> float:
         """Variance v_k of the mean of a block, m²."""
         return record.noise**2 / record.block + (self.discrepancy * record.motion) ** 2
@@ -223,6 +230,17 @@ class AxisFit:
         self.weigh()
         return before != [one.tones for one in self.records]
 
+    def tone_amplitudes(self) -> list[tuple[tuple[float, float], ...]]:
+        """Frequency (Hz) and amplitude (m), in the middle of the record, of each record's tones."""
+        found = []
+        lefts = self._without(self.simulated(self.theta))
+        for record, (left, _) in zip(self.records, lefts, strict=True):
+            free = _Free(record, self.layout, self.variance(record))
+            weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
+            sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
+            found.append(tuple(zip(record.tones, map(float, sizes), strict=True)))
+        return found
+
     def add(self, mode: Mode) -> None:
         """Add a mode."""
         self.layout, self.theta = self.layout.with_mode(self.theta, mode)
@@ -262,7 +280,11 @@ class _Free:
         prior = np.diag([0.0, *np.ones(self.columns.shape[1] - 1)])
         self.matrix = self.columns.T @ self.columns / variance + prior
 
+    def weights(self, signal: Array) -> Array:
+        """Weights of the regressors that explain a signal best."""
+        right = self.columns.T @ signal / self._variance
+        return np.asarray(np.linalg.solve(self.matrix, right))
+
     def without(self, signal: Array) -> Array:
         """Return a signal without what the regressors explain of it."""
-        right = self.columns.T @ signal / self._variance
-        return np.asarray(signal - self.columns @ np.linalg.solve(self.matrix, right))
+        return np.asarray(signal - self.columns @ self.weights(signal))

@@ -130,10 +130,10 @@ class FitSettings:
         "slopes are of order 1",
     )
     creep: float = setting(
-        0.3,
+        0.03,
         "1",
-        "greatest standard deviation of creep's gains",
-        "creep is 1 to 10 % a decade",
+        "greatest standard deviation of the bends of creep's gains, a third of that of a gain",
+        "creep is 1 to 10 % a decade, of four time constants",
     )
     first_scale: float = setting(
         0.1,
@@ -357,11 +357,47 @@ class FitSettings:
         "what averaging over blocks may remove, over the noise's variance",
         "a tenth of the information",
     )
+    near_end: float = setting(
+        0.01,
+        "range of the drive",
+        "distance from an end of the drive at which it has been there",
+        "fifty samples a cycle miss the top of a sine by 0.2 %",
+    )
     fewest_blocks: int = setting(
         200,
         "1",
         "blocks of a record at least",
         "a record has hundreds of parameters",
+    )
+    told: float = setting(
+        0.5,
+        "1",
+        "standard deviation of an effect's measure over that beforehand, where it is identified",
+        "the records then tell more than what is expected of stages",
+    )
+    like_gains: float = setting(
+        2.0,
+        "1",
+        "greatest factor between the gains that records of one scanner show",
+        "hysteresis and creep change a gain by less",
+    )
+    slow_share: float = setting(
+        0.5,
+        "first mode",
+        "frequency up to which records are compared",
+        "a stage moves there as at rest, within a third",
+    )
+    least_slow: float = setting(
+        0.03,
+        "1",
+        "least share of the motion below that, by which a record is compared",
+        "less is hidden by what fast motion leaves",
+    )
+    likeness_parts: int = setting(
+        8,
+        "1",
+        "parts of a record that are left out in turn for an interval of its loops",
+        "the jackknife is not too narrow where parts are few",
     )
 
 

@@ -99,7 +99,12 @@ def signals_of(
     """Choose the blocks of a record, and from where on its memory is known."""
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
-    first = known_from(drive, depolarised=depolarised)
+    first = known_from(drive, settings.near_end, depolarised=depolarised)
+    if len(drive) < settings.fewest_blocks:
+        raise InputError(
+            f"{name}: holds only {len(drive)} samples: give a record of"
+            f" {settings.fewest_blocks} at least"
+        )
     if len(drive) - first < settings.fewest_blocks:
         raise InputError(
             f"{name}: its drive reaches the second of its ends only {len(drive) - first} samples"
@@ -147,11 +152,14 @@ def _bend(signal: Array, block: int) -> float:
     return float(np.sqrt(np.mean((signal[: len(straight)] - straight)[block:-block] ** 2)))
 
 
-def known_from(drive: Array, *, depolarised: bool) -> int:
+def known_from(drive: Array, near: float, *, depolarised: bool) -> int:
     """Sample from which on the scanner's memory is known.
 
-    From an unknown start all is written anew when the drive has been at both of its ends.
+    From an unknown start all is written anew when the drive has been ``near`` both of its ends,
+    within that share of its range.
     """
     if depolarised:
         return 0
-    return max(int(np.argmax(drive)), int(np.argmin(drive)))
+    within = near * np.ptp(drive)
+    ends = drive >= drive.max() - within, drive <= drive.min() + within
+    return max(int(np.argmax(end)) for end in ends)

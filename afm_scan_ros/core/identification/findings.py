@@ -220,12 +220,10 @@ class NotValidated(Finding):
 
 
 @frozen
-class MissingTurns(Finding):
-    """Reversal curves of which none turns between ``below`` and ``above`` V: the fit is coarse."""
+class NotConverged(Finding):
+    """A fit whose likelihood may still grow by ``remaining`` nat."""
 
-    record: str
-    below: float
-    above: float
+    remaining: float
 
 
 @frozen

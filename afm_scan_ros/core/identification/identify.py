@@ -36,12 +36,6 @@ from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     fresh_loops,
     reversal_curves,
 )
-from afm_scan_ros.core.identification.joint.axis import (
-    AnyRecord,
-    JointAxis,
-    error_of,
-    identify_jointly,
-)
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.recording import checked, misfit
 from afm_scan_ros.core.identification.statuses import (
@@ -50,6 +44,7 @@ from afm_scan_ros.core.identification.statuses import (
     spanning,
     vibration_status,
 )
+from afm_scan_ros.core.identification.together import FittedAxis, error_of, identify_together
 from afm_scan_ros.core.identification.validation import Validation, error_on_waves, validate
 from afm_scan_ros.core.identification.vibration.frequency_response import response_at_zero_amplitude
 from afm_scan_ros.core.identification.vibration.line_response import FrequencyResponse
@@ -88,39 +83,33 @@ class AxisIdentification:
         return self.report.warnings
 
 
-def _of_axis(record: Record, axis: str) -> AnyRecord:
-    """Return what a record holds of an axis. Its drive shows its kind where that is not stated.
+def _with_kind(record: Record) -> Record:
+    """Return the record of an axis with the kind that its drive shows, where none is stated.
 
     Steps that are held too shortly to show creep show the ring-down; those of a staircase are
     motion, as that of a scan's slow axis.
     """
-    signals = AxisRecord.of(record, axis)
-    kind = record.kind or recognised(signals.drive)
-    if record.kind is None and kind == "creep":
-        kind = _kind_of_steps(signals)
-    return AnyRecord(record.name, kind, signals, record.depolarised)
-
-
-def _kind_of_steps(signals: AxisRecord) -> str | None:
-    if not rests_briefly(signals.drive, signals.sample_period):
-        return "creep"
-    return "frequency" if len(np.unique(signals.drive)) <= MANY else None
+    drive = record.drive[:, 0]
+    kind = record.kind or recognised(drive)
+    if record.kind is None and kind == "creep" and rests_briefly(drive, record.sample_period):
+        kind = "frequency" if len(np.unique(drive)) <= MANY else None
+    return evolve(record, kind=kind)
 
 
 @frozen(eq=False)
 class Identification:
     """The identified scanner: ``axes`` of which there was a record of each kind.
 
-    Those of ``joint`` were identified from what other records there were.
+    Those ``together`` were fitted to what other records there were, all at once.
     """
 
     axes: Mapping[str, AxisIdentification]
-    joint: Mapping[str, JointAxis] = field(factory=dict)
+    together: Mapping[str, FittedAxis] = field(factory=dict)
 
     @property
     def model(self) -> ScannerModel:
         """The model of all axes."""
-        found: dict[str, AxisIdentification | JointAxis] = {**self.axes, **self.joint}
+        found: dict[str, AxisIdentification | FittedAxis] = {**self.axes, **self.together}
         return ScannerModel(**{name: axis.model for name, axis in found.items()})
 
 
@@ -136,34 +125,39 @@ def identify_records(
     all are fitted together, and what they do not identify is unknown in the model. Raises
     InputError where a record cannot show what it is for, ScanError where a fit does not converge.
     """
-    full, joint = {}, {}
+    full, together = {}, {}
     given = [checked(record) for record in records]
     for axis in AXES:
-        of_axis = [_of_axis(record, axis) for record in given if axis in record.axes]
+        of_axis = [_with_kind(record.axis(axis)) for record in given if axis in record.axes]
         if not of_axis:
             continue
         with _naming(axis), _naming_records(of_axis):
-            found = _of_any(of_axis, sizes, _named(progress, axis))
-        if isinstance(found, JointAxis):
-            joint[axis] = found
+            found = _of_any(of_axis, axis, sizes, _named(progress, axis))
+        if isinstance(found, FittedAxis):
+            together[axis] = found
         else:
             full[axis] = found
-    return Identification(full, joint)
+    return Identification(full, together)
 
 
 def _of_any(
-    records: Sequence[AnyRecord], sizes: Sizes, progress: ProgressCallback
-) -> AxisIdentification | JointAxis:
-    """Identify an axis by its records of each kind, or else jointly."""
+    records: Sequence[Record], axis: str, sizes: Sizes, progress: ProgressCallback
+) -> AxisIdentification | FittedAxis:
+    """Identify an axis by its records of each kind, or else by all of them together."""
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
     if not set(REQUIRED) <= set(first):
-        return identify_jointly(records, sizes.order, progress, sizes.levels)
-    held_out = first.get("validation")
-    creep, frequency, hysteresis = (first[kind].signals for kind in REQUIRED)
-    validation = None if held_out is None else held_out.signals
-    found = identify_axis(creep, frequency, hysteresis, validation, sizes=sizes, progress=progress)
+        if sizes != DEFAULT_SIZES:
+            raise InputError(
+                "levels, order and delay are of an identification from one record each of creep,"
+                " frequency and hysteresis: leave them out, or give these records"
+            )
+        return identify_together(records, axis, progress)
+    signals = {kind: AxisRecord.of(record, axis) for kind, record in first.items()}
+    creep, frequency, hysteresis = (signals[kind] for kind in REQUIRED)
+    held_out = signals.get("validation")
+    found = identify_axis(creep, frequency, hysteresis, held_out, sizes=sizes, progress=progress)
     further = [record for record in records if record not in first.values()]
-    errors = (error_of(found.model, record).model_discrepancy for record in further)
+    errors = (error_of(found.model, record, axis).model_discrepancy for record in further)
     return evolve(found, model=found.model.also_known(errors))
 
 
@@ -181,7 +175,7 @@ def _naming(axis: str) -> Iterator[None]:
 
 
 @contextmanager
-def _naming_records(records: Sequence[AnyRecord]) -> Iterator[None]:
+def _naming_records(records: Sequence[Record]) -> Iterator[None]:
     """Begin what is raised of the record of a kind by that record's name."""
     try:
         yield

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.fit.told import swings
 from afm_scan_ros.core.identification.alternating import (
     REFERENCE_GAIN,
     AxisRecord,
@@ -159,12 +160,5 @@ def hysteresis_status(record: AxisRecord) -> EffectStatus:
     """Status of a hysteresis fitted to a record, which holds up to its fastest turns."""
     return EffectStatus(
         drive=drive_range(record.drive),
-        frequencies=(0.0, turning_rate(record.drive) / record.sample_period),
+        frequencies=(0.0, swings(record.drive) / record.sample_period),
     )
-
-
-def turning_rate(drive: Array) -> float:
-    """Swings a sample of a drive (n,), there and back, counted over the whole of it."""
-    moves = np.diff(drive)
-    ways = np.sign(moves[moves != 0.0])
-    return float(np.count_nonzero(np.diff(ways)) / 2.0 / max(len(drive) - 1, 1))

@@ -35,8 +35,8 @@ def test_blocks_are_as_long_as_nothing_turns_within_them() -> None:
 
 def test_memory_is_known_from_rest_or_from_both_ends() -> None:
     path = np.array([0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
-    assert known_from(path, depolarised=True) == 0
-    assert known_from(path, depolarised=False) == 3
+    assert known_from(path, 0.0, depolarised=True) == 0
+    assert known_from(path, 0.0, depolarised=False) == 3
 
 
 def test_a_record_whose_memory_is_never_known_is_refused_by_name() -> None:

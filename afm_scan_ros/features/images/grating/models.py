@@ -17,17 +17,8 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.joint.axis import hysteresis_of
-from afm_scan_ros.core.identification.joint.bouc_wen import fit_bouc_wen
-from afm_scan_ros.core.identification.joint.fit import (
-    COARSE,
-    JointFit,
-    fit_jointly,
-    grid_of,
-    held_out_by_density,
-)
-from afm_scan_ros.core.identification.joint.moving import MovingRecord, swept
-from afm_scan_ros.core.identification.joint.search import LAGS, NO_CREEP
+from afm_scan_ros.core.fit.model_of_fit import direct_of, from_rest
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.identification.statuses import unknown
 from afm_scan_ros.core.model import (
     Added,
@@ -40,6 +31,17 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.types import Array, ProgressCallback
 from afm_scan_ros.features.images.grating.registration import Registration
+from afm_scan_ros.features.images.loops.bouc_wen import fit_bouc_wen
+from afm_scan_ros.features.images.loops.density import surface_of
+from afm_scan_ros.features.images.loops.fit import (
+    COARSE,
+    JointFit,
+    fit_jointly,
+    grid_of,
+    held_out_by_density,
+)
+from afm_scan_ros.features.images.loops.moving import MovingRecord, swept
+from afm_scan_ros.features.images.loops.search import LAGS, NO_CREEP
 from afm_scan_ros.features.images.positions import LineDrive, rows_of
 from afm_scan_ros.features.images.scan_image import ScanImage
 
@@ -159,7 +161,7 @@ def _of_better_form(
     records: Sequence[MovingRecord], joint: JointFit
 ) -> tuple[HysteresisModel, VibrationModel]:
     """Hysteresis of the form that predicts parts of the loops better; no loop has a density."""
-    hysteresis, vibration = hysteresis_of(joint, None)
+    hysteresis, vibration = _of_density(joint)
     grid = grid_of(records, COARSE)
     rows = list(swept(records, grid))
     found = fit_bouc_wen(rows, joint.dynamics, grid.lower, grid.upper)
@@ -171,6 +173,17 @@ def _of_better_form(
         return hysteresis, vibration
     numerator = tuple(found.gain * each for each in joint.dynamics.vibration.numerator)
     return evolve(hysteresis, forward=slopes), evolve(vibration, numerator=numerator)
+
+
+def _of_density(joint: JointFit) -> tuple[HysteresisModel, VibrationModel]:
+    """Fix the gauge: F is 0 at rest, and runs over as many volts as the drive."""
+    gain = 2.0 * float(joint.weights.sum()) / joint.grid.width
+    surface = surface_of(joint.weights, joint.grid, 0.0)
+    forward, _ = from_rest(evolve(surface, values=surface.values / gain), None)
+    vibration = joint.dynamics.vibration
+    numerator = tuple(gain * each for each in vibration.numerator)
+    direct = direct_of(forward, None, DEFAULT_SETTINGS.direct_levels)
+    return HysteresisModel(forward, direct), evolve(vibration, numerator=numerator)
 
 
 def _gain_of_y(images: Sequence[ScanImage], positions: Sequence[Positions], scale: float) -> float:

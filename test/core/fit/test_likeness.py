@@ -4,20 +4,16 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.agreement import refuse_inconsistent
-from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.joint.axis import AnyRecord, identify_jointly
-from afm_scan_ros.core.identification.joint.fit import grid_of
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord
-from afm_scan_ros.core.identification.joint.search import NO_CREEP
+from afm_scan_ros.core.fit.axis import started
+from afm_scan_ros.core.fit.likeness import refuse_unlike
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
+from afm_scan_ros.core.record import Record
 
 PERIOD = 1e-3
-AT_ONCE = LinearDynamics(VibrationModel((1.0,), (1e-5, 1.0)), NO_CREEP)
 
 
-def records(gain: float) -> list[MovingRecord]:
+def records(gain: float) -> list[Record]:
     """Triangles of three sizes of plays with noise; ``gain`` in m/V."""
     found = []
     for seed, size in enumerate((20.0, 50.0, 95.0)):
@@ -27,17 +23,17 @@ def records(gain: float) -> list[MovingRecord]:
             plays = np.clip(plays, *(each + side * np.linspace(0.0, 45.0, 10) for side in (-1, 1)))
             moved.append(gain * (0.75 * each + 0.25 * plays.mean()))
         noise = np.random.default_rng(seed).normal(0.0, 1e-4 * gain * size, len(drive))
-        found.append(MovingRecord(f"{size:.0f} V", drive, np.roll(moved, 1) + noise, PERIOD))
+        found.append(Record(drive, np.roll(moved, 1) + noise, PERIOD, name=f"{size:.0f} V"))
     return found
 
 
-def exchanged(one: MovingRecord) -> MovingRecord:
+def exchanged(one: Record) -> Record:
     """Record whose two columns, in V and µm, are exchanged."""
     return evolve(one, drive=1e6 * one.displacement, displacement=1e-6 * one.drive)
 
 
-def check(given: list[MovingRecord]) -> None:
-    refuse_inconsistent(given, AT_ONCE, grid_of(given, 12))
+def check(given: list[Record]) -> None:
+    refuse_unlike(started(given, "x", DEFAULT_SETTINGS))
 
 
 @pytest.mark.parametrize("gain", [0.2e-6, 1e-6, 10e-6])
@@ -61,12 +57,3 @@ def test_a_record_of_another_unit_is_named() -> None:
     given[1] = evolve(given[1], displacement=1e3 * given[1].displacement)
     with pytest.raises(InputError, match=r"^50 V: it moves .* unit"):
         check(given)
-
-
-def test_records_are_compared_where_they_are_fitted_together() -> None:
-    given = [each.cut(400) for each in records(0.2e-6)]
-    given[1] = exchanged(given[1])
-    signals = [AxisRecord(each.drive, each.displacement, PERIOD) for each in given]
-    named = [AnyRecord(m.name, None, s) for m, s in zip(given, signals, strict=True)]
-    with pytest.raises(InputError, match=r"^50 V: .*exchanged"):
-        identify_jointly(named, None, lambda _: None)

@@ -5,9 +5,9 @@ import pytest
 from scipy import signal
 from scipy.stats import binom
 
-from afm_scan_ros.core.identification.joint.moving import MovingRecord
-from afm_scan_ros.core.identification.joint.ringing import resonance
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.moving import MovingRecord
+from afm_scan_ros.features.images.loops.ringing import resonance
 from afm_scan_ros.simulation.axis import PlayBank
 
 PERIOD = 1e-3  # s

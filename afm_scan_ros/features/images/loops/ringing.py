@@ -16,14 +16,14 @@ from scipy.signal import argrelmax
 from scipy.stats import f as fisher
 
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
-from afm_scan_ros.core.identification.joint.moving import MovingRecord
-from afm_scan_ros.core.identification.joint.search import LEVEL, jackknife, of_logarithm
 from afm_scan_ros.core.identification.vibration.line_response import transform
 from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
 from afm_scan_ros.core.identification.vibration.spectra import Complex
 from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.moving import MovingRecord
+from afm_scan_ros.features.images.loops.search import LEVEL, jackknife, of_logarithm
 
 SEVERAL = 3
 """Records, or decays of one, from which on their disagreement gives the error."""

@@ -19,17 +19,17 @@ from scipy.stats import t as student
 
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.density import NormalEquations, solve
-from afm_scan_ros.core.identification.joint.moving import (
+from afm_scan_ros.core.identification.vibration.rational_fit import correlated
+from afm_scan_ros.core.least_squares import require_converged
+from afm_scan_ros.core.model import ParameterInterval, closed
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.density import NormalEquations, solve
+from afm_scan_ros.features.images.loops.moving import (
     LinearDynamics,
     MovingRecord,
     Swept,
     parts_of,
 )
-from afm_scan_ros.core.identification.vibration.rational_fit import correlated
-from afm_scan_ros.core.least_squares import require_converged
-from afm_scan_ros.core.model import ParameterInterval, closed
-from afm_scan_ros.core.types import Array
 
 LAGS = np.array([0.1, 2.0, 50.0])
 """Least, first and greatest lag sought, in samples of the fastest record."""

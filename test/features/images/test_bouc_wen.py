@@ -5,13 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
-from afm_scan_ros.core.identification.joint.bouc_wen import BoucWenFit, fit_bouc_wen
-from afm_scan_ros.core.identification.joint.density import CellGrid
-from afm_scan_ros.core.identification.joint.fit import COARSE, _still, held_out_by_density
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics, MovingRecord, Swept, swept
-from afm_scan_ros.core.identification.joint.search import NO_CREEP
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.models import Positions, model_of
+from afm_scan_ros.features.images.loops.bouc_wen import BoucWenFit, fit_bouc_wen
+from afm_scan_ros.features.images.loops.density import CellGrid
+from afm_scan_ros.features.images.loops.fit import COARSE, _still, held_out_by_density
+from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept, swept
+from afm_scan_ros.features.images.loops.search import NO_CREEP
 from afm_scan_ros.features.images.positions import LineDrive
 from afm_scan_ros.features.images.scan_image import ScanImage
 

@@ -13,13 +13,15 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.density import (
+from afm_scan_ros.core.model import ParameterInterval
+from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.features.images.loops.density import (
     CellGrid,
     NormalEquations,
     solve,
     surface_of,
 )
-from afm_scan_ros.core.identification.joint.moving import (
+from afm_scan_ros.features.images.loops.moving import (
     LinearDynamics,
     MovingRecord,
     Swept,
@@ -28,9 +30,9 @@ from afm_scan_ros.core.identification.joint.moving import (
     parts_of,
     swept,
 )
-from afm_scan_ros.core.identification.joint.ringing import Ringing, resonance
-from afm_scan_ros.core.identification.joint.ripple import rippling
-from afm_scan_ros.core.identification.joint.search import (
+from afm_scan_ros.features.images.loops.ringing import Ringing, resonance
+from afm_scan_ros.features.images.loops.ripple import rippling
+from afm_scan_ros.features.images.loops.search import (
     LAGS,
     NO_CREEP,
     Densities,
@@ -39,8 +41,6 @@ from afm_scan_ros.core.identification.joint.search import (
     OneCreep,
     search,
 )
-from afm_scan_ros.core.model import ParameterInterval
-from afm_scan_ros.core.types import Array, ProgressCallback
 
 COARSE, FINER, FINE = 12, 24, 40
 """Cells a side: of the grids on which dynamics and smoothing are sought, and of the last one."""

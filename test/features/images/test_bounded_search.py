@@ -7,15 +7,15 @@ import pytest
 from attrs import frozen
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics
-from afm_scan_ros.core.identification.joint.search import (
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.moving import LinearDynamics
+from afm_scan_ros.features.images.loops.search import (
     NO_CREEP,
     Densities,
     Form,
     OneCreep,
     search,
 )
-from afm_scan_ros.core.types import Array
 
 RNG = np.random.default_rng(5)
 SLOPES, NOISE = RNG.standard_normal((2, 400)), 0.01 * RNG.standard_normal(400)

@@ -22,8 +22,8 @@ from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.joint.moving import LinearDynamics, Swept, loop_parts
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.moving import LinearDynamics, Swept, loop_parts
 
 POWERS = 3
 """Degree of the curve f."""

@@ -15,8 +15,8 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.joint.density import CellGrid, swept_areas
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.density import CellGrid, swept_areas
 
 ROWS = 4_000
 """Rows of all records together, to which they are averaged; it bounds time and memory of a fit."""

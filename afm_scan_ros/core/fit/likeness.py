@@ -1,0 +1,129 @@
+"""Whether records are of one scanner: the gain that each shows, and the way round of its loops.
+
+Of two records, or where the gain is 1 in the units of the columns, loops show which has its columns
+exchanged: they go the other way, as displacement lags the drive in every scanner.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from attrs import frozen
+from scipy.stats import t as student
+
+from afm_scan_ros.core.bands import weighted
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.types import Array
+
+UNITS = 10.0 ** np.array([0, -3, -6, -9])
+"""Of length that a column is given in, m."""
+DIGITS = 6
+"""Of the logarithm of a gain: two records differ equally from their median; loops then decide."""
+
+
+@frozen
+class _Shown:
+    """Gain of a record over the model's, and how wide its loops open, 1/m of its motion.
+
+    Loops open by more the farther the drive goes (Rayleigh); those that lag are positive. ``half``
+    is the half-width of their 95 % interval, infinite where the drive mostly rests.
+    """
+
+    name: str
+    gain: float
+    loops: float
+    half: float
+
+
+def refuse_unlike(fit: AxisFit) -> None:
+    """Refuse a record that is not of the scanner of the others, or has its columns exchanged.
+
+    Records are compared by their motion below the first mode, and one that hardly moves there is
+    not. Raises InputError, which names the record.
+    """
+    simulations = fit.simulated(fit.theta)
+    lines = [fit.gain * one.response.output for one in simulations]
+    mode = min((omega for omega, *_ in fit.layout.of_modes(fit.theta)), default=np.inf)
+    highest, settings = mode / (2.0 * np.pi), fit.layout.settings
+    pairs = zip(fit.records, lines, strict=True)
+    found = [_shown(record, line[record.used], highest, settings) for record, line in pairs]
+    shown = [one for one in found if one is not None]
+    if len(shown) > 1:
+        _refuse_gains(shown, fit.gain, settings.like_gains)
+        _refuse_backward(shown, settings.like_gains)
+
+
+def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> _Shown | None:
+    """Fit a curved line, parabolas that close where the drive turns (Rayleigh), and a delay.
+
+    Returns None where the record hardly moves below the ``mode`` (Hz).
+    """
+    count = len(line)
+    slow = np.arange(count) / (2.0 * count * record.length) < settings.slow_share * mode
+    moved, along = (weighted(each - each.mean(), slow) for each in (record.mean, line))
+    if np.std(along) <= settings.least_slow * np.std(line):
+        return None
+    span = float(np.ptp(along))
+    across, speed = 2.0 * (along - along.min()) / span - 1.0, np.gradient(along)
+    opening = -(span**2) * np.sign(speed) * (1.0 - across**2)
+    columns = np.column_stack([along, span * across**2, opening, speed])
+    columns -= columns.mean(axis=0)
+    found = np.linalg.lstsq(columns, moved, rcond=None)[0]
+    gain = float(along @ moved / (along @ along))
+    rests = np.median(np.abs(np.diff(record.drive))) == 0.0
+    half = np.inf if rests else _half_width(columns, moved - columns @ found, settings) / abs(gain)
+    return _Shown(record.name, gain, float(found[2] / gain), half)
+
+
+def _half_width(columns: Array, residual: Array, settings: FitSettings) -> float:
+    """Half-width of the 95 % interval of the third coefficient, by the jackknife over parts.
+
+    Source: J. G. MacKinnon, M. Ø. Nielsen and M. D. Webb, J. Econometrics 232 (2023) 272, Eq. 13.
+    """
+    count = settings.likeness_parts
+    edges = np.linspace(0, len(columns), count + 1).astype(int)
+    whole, moved = columns.T @ columns, []
+    for first, last in pairwise(edges):
+        part = columns[first:last]
+        left_out = np.linalg.pinv(whole - part.T @ part)
+        moved.append(float((left_out @ (part.T @ residual[first:last]))[2]))
+    spread = float(np.sum((np.array(moved) - np.mean(moved)) ** 2))
+    return float(student.ppf(0.975, count - 1) * np.sqrt(spread * (count - 1) / count))
+
+
+def _refuse_gains(shown: Sequence[_Shown], scale: float, most: float) -> None:
+    """Refuse the record whose gain differs most, where that is by a factor of ``most``."""
+    usual = float(np.exp(np.median(np.log([abs(one.gain) for one in shown]))))
+    backward = sorted(shown, key=lambda one: one.loops)
+    worst = max(backward, key=lambda one: round(abs(np.log(abs(one.gain) / usual)), DIGITS))
+    others = [one for one in shown if one is not worst]
+    beside = float(np.median([one.gain for one in others]))
+    if 1.0 / most <= worst.gain / beside <= most:
+        return
+    ratio = worst.gain * beside * (scale / UNITS) ** 2
+    exchanged = np.any((ratio > 1.0 / most) & (ratio < most))
+    why = (
+        "its drive and displacement columns are exchanged; name them the other way round"
+        if exchanged
+        else "it is of another axis, scanner, unit or amplifier; leave it out, or give its units"
+    )
+    reference = others[0].name if len(others) == 1 else "the other records"
+    raise InputError(
+        f"{worst.name}: it moves {1e9 * scale * worst.gain:.4g} nm per volt, but {reference}"
+        f" {1e9 * scale * beside:.4g} nm: {why}"
+    )
+
+
+def _refuse_backward(shown: Sequence[_Shown], most: float) -> None:
+    """Refuse a record whose loops go the other way, with 95 % confidence, about as wide."""
+    looping = [one for one in shown if np.isfinite(one.half)]
+    for one in looping:
+        least = min((each.loops - each.half for each in looping if each is not one), default=0.0)
+        if one.loops + one.half < 0.0 < least and -one.loops > least / most:
+            raise InputError(
+                f"{one.name}: its displacement runs ahead of its drive, as wide as those of the"
+                " other records lag: its two columns are exchanged; name them the other way round"
+            )

@@ -1,0 +1,156 @@
+"""What the records tell of each effect: whether they do, and the intervals of its parameters.
+
+The posterior of a linear combination r of θ has the variance r (H + Λ)⁻¹ rᵀ. An effect is
+identified where the records narrow its measure, from what is expected beforehand at the greatest
+scales, to less than a share ``told`` of that: the sum of the gains of creep, the opening of the
+loop over the whole range, or the mean lag where no mode is seen.
+"""
+
+import numpy as np
+from attrs import frozen
+from scipy.linalg import cho_factor, cho_solve
+
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.parameters import SEARCHED
+from afm_scan_ros.core.model import (
+    BaseEffects,
+    EffectStatus,
+    ParameterInterval,
+    Range,
+    Status,
+    closed,
+)
+from afm_scan_ros.core.types import Array
+
+CONFIDENT = 1.96
+"""Standard deviations to either end of a 95 % interval of a normal variable."""
+
+
+@frozen(eq=False)
+class Knowledge:
+    """What is known of θ: covariances of the posterior, and both at the greatest scales.
+
+    All are of shape (size, size); ``posterior`` is at the scales of the greatest evidence.
+    """
+
+    fit: AxisFit
+    posterior: Array
+    widest: Array
+    beforehand: Array
+
+    @classmethod
+    def of(cls, fit: AxisFit) -> "Knowledge":
+        """Invert the normal equations of a fit."""
+        layout = fit.layout
+        greatest = {name: getattr(layout.settings, name) for name in SEARCHED}
+        matrix, _ = fit.normal(with_operator=True)
+        own, wide = (layout.prior(scales, fit.theta)[0] for scales in (fit.scales, greatest))
+        sums = (layout.conditioned(one) for one in (matrix + own, matrix + wide, wide))
+        return cls(fit, *map(_inverse, sums))
+
+    def tells(self, row: Array) -> bool:
+        """Whether the records narrow a combination of θ, (size,), far enough."""
+        after, before = (float(row @ each @ row) for each in (self.widest, self.beforehand))
+        return after < self.fit.layout.settings.told**2 * before
+
+    def interval(self, name: str, unit: str, value: float, row: Array) -> ParameterInterval:
+        """95 % interval of a combination of θ, (size,), that may not be negative."""
+        half = CONFIDENT * float(np.sqrt(row @ self.posterior @ row))
+        return closed(name, (max(value - half, 0.0), value + half), unit)
+
+
+def effects_of(fit: AxisFit) -> BaseEffects:
+    """How each effect is known, over which drive, frequencies and hold times."""
+    known = Knowledge.of(fit)
+    return BaseEffects(_creep(known), _hysteresis(known), _vibration(known))
+
+
+def _range(fit: AxisFit) -> Range:
+    return fit.layout.operator.lower, fit.layout.operator.upper
+
+
+def _row(fit: AxisFit, part: str, values: Array | float) -> Array:
+    row = np.zeros(fit.layout.size)
+    row[fit.layout.parts[part]] = values
+    return row
+
+
+def _unknown(kind: str) -> EffectStatus:
+    return EffectStatus(Status.UNKNOWN, identifiable_from=kind)
+
+
+def _creep(known: Knowledge) -> EffectStatus:
+    fit = known.fit
+    row = _row(fit, "creep", 1.0)
+    if not known.tells(row):
+        return _unknown("creep")
+    longest = max(len(one.drive) * one.period for one in fit.records)
+    return EffectStatus(
+        drive=_range(fit),
+        hold_times=(float(fit.layout.time_constants[0]), longest),
+        intervals=(known.interval("gain", "1", float(row @ fit.theta), row),),
+    )
+
+
+def _hysteresis(known: Knowledge) -> EffectStatus:
+    fit = known.fit
+    opening, row = _opening(fit)
+    if not known.tells(row):
+        return _unknown("hysteresis")
+    return EffectStatus(
+        drive=_range(fit),
+        frequencies=(0.0, max(swings(one.drive) / one.period for one in fit.records)),
+        intervals=(known.interval("opening", "V", opening, row),),
+    )
+
+
+def _opening(fit: AxisFit) -> tuple[float, Array]:
+    """F (V) in the middle of the largest loop on its way down less that up, and its row."""
+    operator, count = fit.layout.operator, fit.layout.settings.direct_levels
+    up = np.linspace(operator.lower, operator.upper, 2 * count + 1)
+    drive = np.concatenate([up, up[-2::-1]])
+    theta = fit.layout.of_operator(fit.theta)
+    output = operator.output(theta, drive, rested=False)
+    rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, 1, rested=False))])
+    row = np.zeros(fit.layout.size)
+    row[: rows.shape[1]] = rows[3 * count] - rows[count]
+    return float(output[3 * count] - output[count]), row
+
+
+def _vibration(known: Knowledge) -> EffectStatus:
+    fit = known.fit
+    length = min(one.length for one in fit.records)
+    status = EffectStatus(drive=_range(fit), frequencies=(0.0, 0.5 / length))
+    if modes := fit.layout.of_modes(fit.theta):
+        peaks = [np.hypot(real, imag) / damping for _, damping, real, imag in modes]
+        return _with_intervals(status, _of_mode(known, int(np.argmax(peaks))))
+    row = _row(fit, "lags", fit.layout.lags)
+    if not known.tells(row):
+        return _unknown("frequency")
+    return _with_intervals(status, (known.interval("lag", "s", float(row @ fit.theta), row),))
+
+
+def _with_intervals(status: EffectStatus, intervals: tuple[ParameterInterval, ...]) -> EffectStatus:
+    return EffectStatus(drive=status.drive, frequencies=status.frequencies, intervals=intervals)
+
+
+def _of_mode(known: Knowledge, which: int) -> tuple[ParameterInterval, ...]:
+    """Intervals of frequency and damping, of which θ holds the logarithms."""
+    first = known.fit.layout.parts["modes"].start + 4 * which
+    omega, damping, *_ = known.fit.layout.of_modes(known.fit.theta)[which]
+    halves = CONFIDENT * np.sqrt(np.diag(known.posterior)[first : first + 2])
+    values, units = (omega / (2.0 * np.pi), damping), ("Hz", "1")
+    ends = [(v * np.exp(-half), v * np.exp(half)) for v, half in zip(values, halves, strict=True)]
+    names = "resonance", "damping"
+    return tuple(map(closed, names, ends, units))
+
+
+def swings(drive: Array) -> float:
+    """Swings of a drive (n,) a sample, there and back."""
+    moves = np.diff(drive)
+    ways = np.sign(moves[moves != 0.0])
+    return float(np.count_nonzero(np.diff(ways)) / 2.0 / max(len(drive) - 1, 1))
+
+
+def _inverse(matrix: Array) -> Array:
+    return np.asarray(cho_solve(cho_factor(matrix), np.eye(len(matrix))))

@@ -1,1 +1,0 @@
-"""One axis from records of any kinds: hysteresis, creep and lag fitted together."""

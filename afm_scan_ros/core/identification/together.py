@@ -1,0 +1,118 @@
+"""Records of one axis, of any kinds → its model, by one fit of them all."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.model_of_fit import model_of
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.signals import known_from
+from afm_scan_ros.core.fit.told import effects_of
+from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.findings import (
+    Finding,
+    Hum,
+    NotConverged,
+    NotValidated,
+    UnknownStart,
+    ValidationMismatch,
+)
+from afm_scan_ros.core.identification.validation import (
+    PREDICTED,
+    Validation,
+    of_fitted,
+    validate_from,
+)
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.types import ProgressCallback
+
+
+@frozen(eq=False)
+class FittedAxis:
+    """The model of an axis with figures of its fit.
+
+    ``operator`` is that of the hysteresis; ``discrepancy`` is η, the model's error over the motion;
+    ``left`` is the rms (m) that the model leaves of each record, by name. ``validation`` is of the
+    record held out, where there is one.
+    """
+
+    model: AxisModel
+    operator: str
+    discrepancy: float
+    left: Mapping[str, float]
+    warnings: tuple[Finding, ...]
+    validation: Validation | None
+
+
+def identify_together(
+    records: Sequence[Record],
+    axis: str,
+    progress: ProgressCallback,
+    settings: FitSettings = DEFAULT_SETTINGS,
+) -> FittedAxis:
+    """Identify an axis from all its records but one that is to validate.
+
+    Raises InputError where the records show nothing or are not of one scanner, ScanError where the
+    fit diverges.
+    """
+    held_out = next((one for one in records if one.kind == "validation"), None)
+    fitting = [one for one in records if one is not held_out]
+    if not fitting:
+        raise InputError("a validation record alone fits nothing: give more records")
+    fit = fit_axis(fitting, axis, settings, progress)
+    progress("what the records tell of each effect")
+    model = evolve(model_of(fit), effects=effects_of(fit))
+    progress("validating")
+    validation = None if held_out is None else error_of(model, held_out, axis)
+    known = [] if validation is None else [validation.model_discrepancy]
+    for one in fitting:
+        error = validate_from(model, AxisRecord.of(one, axis), one.name, 0).model_discrepancy
+        known.append(of_fitted(error, fit.discrepancy))
+    left = fit.residuals(fit.simulated(fit.theta))
+    return FittedAxis(
+        model=model.also_known(known),
+        operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
+        discrepancy=fit.discrepancy,
+        left={r.name: float(np.std(each)) for r, each in zip(fit.records, left, strict=True)},
+        warnings=(*_of_fit(fit), *_of_validation(held_out, validation)),
+        validation=validation,
+    )
+
+
+def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
+    """Return a model's residual of a record, from where its memory is known on.
+
+    Raises InputError where the drive leaves the identified range.
+    """
+    signals = AxisRecord.of(record, axis)
+    near = DEFAULT_SETTINGS.near_end
+    first = known_from(signals.drive, near, depolarised=record.depolarised)
+    return validate_from(model, signals, record.name, first)
+
+
+def _of_fit(fit: AxisFit) -> Iterator[Finding]:
+    """Yield what a user should know of the records and of the fit before trusting the model."""
+    for record, tones in zip(fit.records, fit.tone_amplitudes(), strict=True):
+        if tones:
+            yield Hum(record.name, tones)
+        if record.first:
+            yield UnknownStart(record.name, record.first * record.period)
+    if not fit.converged:
+        yield NotConverged(fit.remaining)
+
+
+def _of_validation(record: Record | None, result: Validation | None) -> Iterator[Finding]:
+    """Yield what is wrong with the held-out data, or that there are none."""
+    if record is None or result is None:
+        yield NotValidated()
+        return
+    moved = float(np.std(record.displacement))
+    share = float(np.linalg.norm(result.model_discrepancy.rms)) / moved
+    if share > PREDICTED:
+        yield ValidationMismatch(record.name, share)

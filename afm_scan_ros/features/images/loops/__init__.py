@@ -1,0 +1,1 @@
+"""Loops seen in images of gratings: hysteresis, creep and lag fitted together."""

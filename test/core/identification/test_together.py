@@ -1,0 +1,149 @@
+"""A model from records of any kinds, fitted together: what it predicts, and what it states."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.effects.base import Cascade
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.identification.findings import NotValidated, UnknownStart
+from afm_scan_ros.core.identification.together import FittedAxis, identify_together
+from afm_scan_ros.core.model import ParameterInterval, Status
+from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.density import CellGrid, surface_of
+
+LOWER, UPPER = -1.0, 2.5
+SAMPLE_PERIOD = 5e-3
+NOISE = 70e-9  # m rms
+
+
+def truth() -> Cascade:
+    """Hysteresis of random density, a lag of 12 ms, 3 % of creep in 8 s; displacement in m."""
+    rng = np.random.default_rng(1)
+    grid = CellGrid(LOWER, UPPER, 9)  # in none of the grids that are fitted
+    density = rng.uniform(0.2, 1.0, (grid.cells, grid.cells)) + 6.0 * np.eye(grid.cells)
+    weights = density[np.tril_indices(grid.cells)]
+    surface = surface_of(weights / weights.sum(), grid, offset=0.0)
+    from_rest = evolve(surface, offset=-float(Preisach(surface).at_rest().now[1]))
+    lag = VibrationModel((10e-6,), (0.012, 1.0))  # F runs over 2 V
+    creep = CreepModel((0.03,), (8.0,))
+    parts = Preisach(from_rest), Vibration(lag, SAMPLE_PERIOD), Creep(creep, SAMPLE_PERIOD)
+    return Cascade(parts)
+
+
+TRUTH = truth()
+
+
+def moved(drive: Array) -> Array:
+    """True displacement (m) from depolarised rest on, but for where that is."""
+    return TRUTH.apply(TRUTH.at_rest(), drive)[1]
+
+
+def swinging(seconds: float, envelope: Array, rate: float = 1.0) -> Array:
+    """Drive that swings about zero; the envelope from 0 to 1 at equal times."""
+    time = np.arange(0.0, seconds, SAMPLE_PERIOD)
+    size = np.interp(time, np.linspace(0.0, seconds, len(envelope)), envelope)
+    wave = size * np.sin(2.0 * np.pi * rate * time)
+    return np.asarray(np.where(wave > 0.0, UPPER * wave, -LOWER * wave))
+
+
+LOOPS = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
+FRESH = swinging(20.0, np.array([0.9, 0.2, 0.7, 0.1, 0.8]), rate=0.7)
+LOWEST = int(np.argmin(LOOPS))
+ORIGIN = -96e-6  # m
+
+
+def measured(name: str, drive: Array, seed: int, start: str = "unknown", kind: str = "") -> Record:
+    """Record of a sensor with noise, whose zero is elsewhere."""
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, len(drive))
+    moved_there = ORIGIN + moved(drive) + noise
+    return Record(drive, moved_there, SAMPLE_PERIOD, name=name, start=start, kind=kind or None)
+
+
+def error_on(found: FittedAxis, drive: Array) -> float:
+    """Standard deviation (m) of what a model misses, once its memory is that of the scanner."""
+    model = forward(found.model, SAMPLE_PERIOD)
+    return float(np.std((model.apply(model.at_rest(), drive)[1] - moved(drive))[400:]))
+
+
+@pytest.fixture(scope="module", params=["depolarised", "unknown"])
+def fit(request: pytest.FixtureRequest) -> FittedAxis:
+    given = measured("loops", LOOPS, 2, request.param)
+    held_out = measured("fresh", FRESH, 5, request.param, "validation")
+    return identify_together([given, held_out], "x", lambda _: None)
+
+
+def test_records_are_matched_to_the_noise(fit: FittedAxis) -> None:
+    assert 0.9 * NOISE < fit.left["loops"] < 1.1 * NOISE
+
+
+def within(interval: ParameterInterval, true: float) -> bool:
+    """Whether a value lies within one and a half times the 95 % interval: chance leaves 0.3 %."""
+    assert interval.lower is not None
+    assert interval.upper is not None
+    middle, half = 0.5 * (interval.lower + interval.upper), 0.5 * (interval.upper - interval.lower)
+    return abs(true - middle) < 1.5 * half
+
+
+def test_lag_and_creep_lie_within_their_intervals(fit: FittedAxis) -> None:
+    effects = fit.model.effects
+    (lag,), (gain,) = effects.vibration.intervals, effects.creep.intervals
+    assert (lag.name, gain.name) == ("lag", "gain")
+    assert within(lag, 0.012)
+    assert within(gain, 0.03)
+
+
+def test_fresh_loops_of_another_rate_are_predicted_close_to_the_noise(fit: FittedAxis) -> None:
+    assert error_on(fit, FRESH) < NOISE
+
+
+def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
+    assert fit.validation is not None
+    known, *fitted = fit.model.model_discrepancies
+    assert known.record.startswith("fresh")
+    assert [each.fitted for each in fitted] == [True]
+    assert not any(isinstance(each, NotValidated) for each in fit.warnings)
+
+
+def test_what_precedes_a_known_memory_is_named(fit: FittedAxis) -> None:
+    unknown = [each for each in fit.warnings if isinstance(each, UnknownStart)]
+    lengths = [each.seconds for each in unknown]
+    assert all(LOWEST - 10 < each / SAMPLE_PERIOD <= LOWEST for each in lengths)
+
+
+def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
+    size = np.array([1.0, 1.0])
+    records = [
+        measured("slow", swinging(12.0, size), 3),
+        measured("fast", swinging(6.0, 0.5 * size, rate=4.0), 4),
+    ]
+    found = identify_together(records, "x", lambda _: None)
+    fresh = swinging(10.0, 0.75 * size, rate=2.0)
+    assert error_on(found, fresh) < 3e-3 * np.ptp(moved(fresh))
+
+
+def test_curves_that_turn_in_part_of_the_drive_predict_those_between() -> None:
+    """A scanner without lag or creep: a sample later the displacement is where the drive led."""
+
+    def curves(turns: Array) -> Array:
+        each = [np.linspace(turn, UPPER, 50) for turn in turns]
+        return np.concatenate([[UPPER], *each, [UPPER]])
+
+    def answer(drive: Array) -> Array:
+        plays = np.full(20, UPPER) - (widths := np.linspace(0.0, 1.5, 20))
+        rows_of_record = []
+        for each in drive:
+            plays = np.clip(plays, each - widths, each + widths)
+            rows_of_record.append(1e-6 * plays.sum())
+        return np.roll(rows_of_record, 1)
+
+    drive, fresh = (curves(np.linspace(LOWER, top, count)) for top, count in ((1.0, 21), (0.9, 14)))
+    found = identify_together([Record(drive, answer(drive), 1.0)], "x", lambda _: None)
+    assert found.model.effects.hysteresis.status is Status.IDENTIFIED
+    model = forward(found.model, 1.0)
+    error = (model.apply(model.at_rest(), fresh)[1] - answer(fresh))[1:]
+    assert np.std(error) < 1e-2 * np.ptp(answer(fresh)[1:])

@@ -1,0 +1,159 @@
+"""Loops in images of gratings: the areas against the walk, the density against a truth."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
+from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.loops.density import (
+    CellGrid,
+    NormalEquations,
+    cell_count,
+    roughness,
+    side,
+    solve,
+    surface_of,
+    swept_areas,
+)
+from afm_scan_ros.features.images.loops.fit import fit_jointly
+from afm_scan_ros.features.images.loops.moving import ROWS, MovingRecord, swept
+
+LOWER, UPPER = -1.0, 2.5
+SAMPLE_PERIOD = 5e-3
+NOISE = 70e-9  # m rms
+CELLS = 5
+GRID = CellGrid(LOWER, UPPER, CELLS)
+
+weights_of_cells = arrays(np.float64, cell_count(CELLS), elements=st.floats(0.01, 1.0))
+drives = arrays(np.float64, st.integers(1, 60), elements=st.floats(LOWER, UPPER))
+
+
+@given(weights_of_cells, drives)
+@settings(deadline=None)
+def test_weights_times_areas_are_the_walk_along_their_surface(weights: Array, drive: Array) -> None:
+    model = Preisach(surface_of(weights, GRID, offset=0.3))
+    walked = model.apply(model.saturated(), drive)[1]
+    areas = swept_areas(drive, GRID)
+    np.testing.assert_allclose(0.3 + areas @ weights, walked, rtol=0.0, atol=1e-11)
+
+
+@given(weights_of_cells, drives, drives, st.integers(1, 5))
+@settings(deadline=None)
+def test_rows_are_means_of_what_follows_what_was_before(
+    weights: Array, before: Array, drive: Array, every: int
+) -> None:
+    both = swept_areas(np.concatenate([before, drive]), GRID)[len(before) :]
+    whole = len(drive) // every
+    means = both[: whole * every].reshape(whole, every, len(weights)).mean(axis=1)
+    np.testing.assert_allclose(swept_areas(drive, GRID, before, every), means, atol=1e-11)
+
+
+@given(drives)
+@settings(deadline=None)
+def test_no_cell_is_switched_by_less_than_nothing_or_more_than_all(drive: Array) -> None:
+    areas = swept_areas(drive, GRID)
+    assert areas.min() >= -1e-12
+    assert areas.max() <= 2.0 + 1e-12
+    full = swept_areas(np.array([UPPER, LOWER]), GRID)
+    np.testing.assert_allclose(full, [[2.0] * len(full[0]), [0.0] * len(full[0])], atol=1e-12)
+
+
+def test_a_drive_out_of_the_range_is_refused() -> None:
+    with pytest.raises(BeyondRangeError, match=r"sample 1 of the block: 2\.6 V is beyond"):
+        swept_areas(np.array([0.0, 2.6]), GRID)
+
+
+@given(st.integers(1, 200))
+def test_side_undoes_the_count(cells: int) -> None:
+    assert side(cell_count(cells)) == cells
+
+
+def test_an_even_density_is_not_rough_and_every_other_is() -> None:
+    form = roughness(CELLS)
+    on_diagonal = np.eye(CELLS)[np.tril_indices(CELLS)]
+    assert np.ones(len(form)) @ form @ np.ones(len(form)) == pytest.approx(0.0, abs=1e-9)
+    assert on_diagonal @ form @ on_diagonal == pytest.approx(0.0, abs=1e-9)
+    assert np.linalg.matrix_rank(form) == len(form) - 2
+
+
+def test_weights_are_found_where_the_areas_separate_them() -> None:
+    rng = np.random.default_rng(0)
+    areas = rng.uniform(0.0, 2.0, (200, cell_count(CELLS)))
+    weights = rng.uniform(0.1, 1.0, cell_count(CELLS))
+    weights[1] = 0.0  # at the bound
+    found = solve(NormalEquations.of(areas, areas @ weights, len(areas)), smoothing=0.0)
+    np.testing.assert_allclose(found, weights, rtol=0.0, atol=1e-7)
+
+
+@given(st.lists(st.tuples(st.integers(1_000, 9_000), st.integers(50, 900)), min_size=1, max_size=3))
+@example([(5121, 50), (7369, 50), (7511, 244)])
+@settings(deadline=None, max_examples=25)
+def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
+    """Also where the first swings are shown again, in finer rows.
+
+    A record loses less than a row at its end and half a row where the finer rows end.
+    """
+    waves = [np.sin(2.0 * np.pi * np.arange(n) / period) for n, period in sizes]
+    records = [MovingRecord(str(k), w, w, SAMPLE_PERIOD) for k, w in enumerate(waves)]
+    rows = list(swept(records, CellGrid(LOWER, UPPER, 2)))
+    for record in records:
+        rows_of_record = [one for one in rows if one.record.name == record.name]
+        counted = sum(float(one.samples.sum()) for one in rows_of_record)
+        seen = min(len(record.drive), ROWS * rows_of_record[0].every)
+        assert abs(counted - seen) <= 1.5 * sum(one.every for one in rows_of_record)
+
+
+LOOPS = np.interp(np.arange(600), np.linspace(0, 600, 7), [0.0, UPPER, LOWER, 0.1, 0.0, 2.0, 0.0])
+
+
+def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
+    loops = MovingRecord("loops", LOOPS, LOOPS, SAMPLE_PERIOD)
+    first = loops.known_from()
+    seen = LOOPS[: first + 1]
+    assert seen.max() == pytest.approx(UPPER, abs=0.05)
+    assert seen.min() == pytest.approx(LOWER, abs=0.05)
+    assert MovingRecord("loops", LOOPS, LOOPS, 1.0, depolarised=True).known_from() == 0
+    up = MovingRecord("up", np.abs(LOOPS), LOOPS, 1.0)
+    assert up.drive[up.known_from()] == pytest.approx(UPPER, abs=0.05)
+
+
+def first_rises(gain: float) -> list[MovingRecord]:
+    """Triangles from 0 V of plays that begin depolarised, and with a creep of 0.3 s; m."""
+    records, period = [], 5e-3
+    for seed, (size, rate) in enumerate(((40.0, 1.0), (95.0, 1.0), (95.0, 5.0))):
+        turns = rate * period * np.arange(800)
+        drive = size * (1.0 - np.abs(1.0 - 2.0 * (turns % 1.0)))
+        plays, moved = np.zeros(20), []
+        for each in drive:
+            plays = np.clip(plays, *(each + side * np.linspace(0.0, 45.0, 20) for side in (-1, 1)))
+            moved.append(0.2e-6 * (0.75 * each + 0.25 * plays.mean()))
+        noise = np.random.default_rng(seed).normal(0.0, 2e-9, len(drive))
+        creep = Creep(CreepModel((gain,), (0.3,)), period)
+        moved = creep.apply(creep.at_rest(), np.array(moved))[1] + noise
+        records.append(MovingRecord(f"{size} V", drive, np.asarray(moved), period))
+    return records
+
+
+AT_ONCE = VibrationModel((1.0,), (1e-4, 1.0))
+
+
+@pytest.mark.evidence
+def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
+    without = fit_jointly(first_rises(0.0), AT_ONCE, None, lambda _: None)
+    assert without.creep is None
+    found = fit_jointly(first_rises(0.1), AT_ONCE, None, lambda _: None).creep
+    assert found is not None
+    assert found[0].lower is not None
+    assert found[0].lower < 1.05 * 0.1
+
+
+def test_a_record_at_rest_is_refused() -> None:
+    with pytest.raises(InputError, match="drive or displacement rests"):
+        MovingRecord("still", LOOPS, np.zeros_like(LOOPS), SAMPLE_PERIOD)
