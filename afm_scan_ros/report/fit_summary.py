@@ -61,8 +61,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.NotConverged: "The fit has not converged: the likelihood may still grow by"
     " {remaining:.3g} nat, so the intervals do not hold. Give further records, of other sizes and"
     " rates.",
-    found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
-    " {seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state that.",
+    found.UncertainScan: "The records tell a scan over the whole drive to {share:.1%} of its range"
+    " only (one standard deviation). Add triangles or loops over the whole drive, of several"
+    " amplitudes.",
 }
 """Findings that are worded with their figures as they are."""
 
@@ -133,6 +134,17 @@ def _(one: found.ResponseMisfit) -> str:
     return (
         f"The vibration model differs from the response by {one.misfit:.2%} rms from {low:.0f} to"
         f" {high:.0f} Hz. {CAUSES[one.cause].format(share=one.share)}"
+    )
+
+
+@finding_text.register
+def _(one: found.UnknownStart) -> str:
+    effect = "was taken for that after long motion"
+    if one.seconds:
+        effect = f"is unknown, so its first {one.seconds:.3g} s were not fitted"
+    return (
+        f"The hysteresis' state at the start of {one.record} {effect}. Depolarise the scanner"
+        " before a record, and state that."
     )
 
 
@@ -218,6 +230,7 @@ def together_summary(found: FittedAxis) -> dict[str, Any]:
         "records": {name: {"left_rms_m": left} for name, left in found.left.items()},
         "operator": found.operator,
         "discrepancy_over_motion": found.discrepancy,
+        "scan_deviation_over_range": found.deviation,
         "effects": asdict(found.model.effects, value_serializer=_plain),
         "model_discrepancy": known,
         "warnings": [finding_text(finding) for finding in found.warnings],

@@ -28,6 +28,7 @@ from afm_scan_ros.core.identification.findings import (
     ShortHold,
     SingleWave,
     SlowStep,
+    UncertainScan,
     UndeterminedCreepElement,
     UnfinishedRecord,
     UnknownStart,
@@ -83,8 +84,10 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
         "4 nm at 150.18",
     ),
     NotValidated(): ("error is not known", "validation record"),
+    UncertainScan(0.034): ("3.4% of its range", "triangles or loops"),
     NotConverged(12.5): ("has not converged", "12.5 nat", "further records"),
-    UnknownStart("scan", 0.25): ("start of scan", "0.25 s", "Depolarise"),
+    UnknownStart("scan", 0.25): ("start of scan is unknown", "0.25 s", "Depolarise"),
+    UnknownStart("scan", 0.0): ("start of scan was taken", "long motion", "Depolarise"),
 }
 
 

@@ -25,7 +25,7 @@ DIGITS = 6
 
 
 @frozen
-class _Shown:
+class _RecordGain:
     """Gain of a record over the model's, and how wide its loops open, 1/m of its motion.
 
     Loops open by more the farther the drive goes (Rayleigh); those that lag are positive. ``half``
@@ -56,13 +56,14 @@ def refuse_unlike(fit: AxisFit) -> None:
         _refuse_backward(shown, settings.like_gains)
 
 
-def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> _Shown | None:
+def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> _RecordGain | None:
     """Fit a curved line, parabolas that close where the drive turns (Rayleigh), and a delay.
 
     Returns None where the record hardly moves below the ``mode`` (Hz).
     """
     count = len(line)
-    slow = np.arange(count) / (2.0 * count * record.length) < settings.slow_share * mode
+    frequency = np.arange(count) / (2.0 * count * record.length)
+    slow = np.where(frequency < settings.slow_share * mode, 1.0, 0.0)
     moved, along = (weighted(each - each.mean(), slow) for each in (record.mean, line))
     if np.std(along) <= settings.least_slow * np.std(line):
         return None
@@ -75,7 +76,7 @@ def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> 
     gain = float(along @ moved / (along @ along))
     rests = np.median(np.abs(np.diff(record.drive))) == 0.0
     half = np.inf if rests else _half_width(columns, moved - columns @ found, settings) / abs(gain)
-    return _Shown(record.name, gain, float(found[2] / gain), half)
+    return _RecordGain(record.name, gain, float(found[2] / gain), half)
 
 
 def _half_width(columns: Array, residual: Array, settings: FitSettings) -> float:
@@ -94,7 +95,7 @@ def _half_width(columns: Array, residual: Array, settings: FitSettings) -> float
     return float(student.ppf(0.975, count - 1) * np.sqrt(spread * (count - 1) / count))
 
 
-def _refuse_gains(shown: Sequence[_Shown], scale: float, most: float) -> None:
+def _refuse_gains(shown: Sequence[_RecordGain], scale: float, most: float) -> None:
     """Refuse the record whose gain differs most, where that is by a factor of ``most``."""
     usual = float(np.exp(np.median(np.log([abs(one.gain) for one in shown]))))
     backward = sorted(shown, key=lambda one: one.loops)
@@ -117,7 +118,7 @@ def _refuse_gains(shown: Sequence[_Shown], scale: float, most: float) -> None:
     )
 
 
-def _refuse_backward(shown: Sequence[_Shown], most: float) -> None:
+def _refuse_backward(shown: Sequence[_RecordGain], most: float) -> None:
     """Refuse a record whose loops go the other way, with 95 % confidence, about as wide."""
     looping = [one for one in shown if np.isfinite(one.half)]
     for one in looping:

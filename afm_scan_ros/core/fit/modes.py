@@ -137,7 +137,7 @@ def _about(
         band = slice(*np.searchsorted(one.omega, edges))
         left, driven, at = one.left[band], one.driven[band], one.omega[band]
         power = np.abs(left) ** 2
-        if len(at) < 4 or at[-1] < omega or not power.any():  # noqa: PLR2004 - as many weights
+        if len(at) < 4 or at[-1] < omega or not power.any() or not driven.any():  # noqa: PLR2004 - as many weights
             continue
         z, turned = np.exp(pole * one.period), np.exp(1j * at * one.period)
         rising, falling = (1.0 - z) / (turned - z), (1.0 - z.conj()) / (turned - z.conj())

@@ -375,6 +375,12 @@ class FitSettings:
         "standard deviation of an effect's measure over that beforehand, where it is identified",
         "the records then tell more than what is expected of stages",
     )
+    poor: float = setting(
+        0.01,
+        "range",
+        "standard deviation of a predicted scan above which a user is warned",
+        "a straight line errs by some per cent",
+    )
     like_gains: float = setting(
         2.0,
         "1",

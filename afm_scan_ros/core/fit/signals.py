@@ -99,18 +99,12 @@ def signals_of(
     """Choose the blocks of a record, and from where on its memory is known."""
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
-    first = known_from(drive, settings.near_end, depolarised=depolarised)
     if len(drive) < settings.fewest_blocks:
         raise InputError(
             f"{name}: holds only {len(drive)} samples: give a record of"
             f" {settings.fewest_blocks} at least"
         )
-    if len(drive) - first < settings.fewest_blocks:
-        raise InputError(
-            f"{name}: its drive reaches the second of its ends only {len(drive) - first} samples"
-            " before the record's end, so that nothing is known of what the material remembered"
-            " before: record on, or begin depolarised at rest and state it"
-        )
+    first = known_from(drive, settings, depolarised=depolarised)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise)
 
 
@@ -152,14 +146,17 @@ def _bend(signal: Array, block: int) -> float:
     return float(np.sqrt(np.mean((signal[: len(straight)] - straight)[block:-block] ** 2)))
 
 
-def known_from(drive: Array, near: float, *, depolarised: bool) -> int:
-    """Sample from which on the scanner's memory is known.
+def known_from(drive: Array, settings: FitSettings, *, depolarised: bool) -> int:
+    """Sample from which on a record counts, as the scanner's memory is then known.
 
-    From an unknown start all is written anew when the drive has been ``near`` both of its ends,
-    within that share of its range.
+    From an unknown start all is written anew when the drive has been near both of its ends. Where
+    it hardly moves after that, or the record ends, the whole record counts all the same, as of a
+    scanner that came to the first sample from long motion.
     """
     if depolarised:
         return 0
-    within = near * np.ptp(drive)
+    within = settings.near_end * np.ptp(drive)
     ends = drive >= drive.max() - within, drive <= drive.min() + within
-    return max(int(np.argmax(end)) for end in ends)
+    first = max(int(np.argmax(end)) for end in ends)
+    enough = len(drive) - first >= settings.fewest_blocks and np.ptp(drive[first:]) > within
+    return first if enough else 0

@@ -12,6 +12,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
+from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
+from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.model import (
     BaseEffects,
     EffectStatus,
@@ -58,11 +60,34 @@ class Knowledge:
         half = CONFIDENT * float(np.sqrt(row @ self.posterior @ row))
         return closed(name, (max(value - half, 0.0), value + half), unit)
 
+    @property
+    def of_scan(self) -> float:
+        """Standard deviation of a predicted scan but for its mean, over its range (1).
 
-def effects_of(fit: AxisFit) -> BaseEffects:
-    """How each effect is known, over which drive, frequencies and hold times."""
-    known = Knowledge.of(fit)
-    return BaseEffects(_creep(known), _hysteresis(known), _vibration(known))
+        It is a triangle over the whole range, of a thousand samples of the fastest record a cycle,
+        and includes the discrepancy η.
+        """
+        fit, layout = self.fit, self.fit.layout
+        low, high = layout.operator.lower, layout.operator.upper
+        drive = np.interp(np.arange(2001) % 1000, [0, 500, 1000], [low, high, low])
+        period = min(one.period for one in fit.records)
+        still = np.zeros_like(drive)
+        record = Signals("scan", drive, still, period, 1, 1000, rested=False, noise=0.0)
+        simulation = simulate(layout, fit.theta, record)
+        theta = layout.of_operator(fit.theta)
+        pieces = layout.operator.pieces(theta, drive, 1, rested=False)
+        rows = [one for _, one in jacobian(layout, fit.theta, record, simulation, pieces)]
+        change = np.concatenate(rows)
+        change -= change.mean(axis=0)
+        variance = np.einsum("ij,jk,ik->", change, self.posterior, change, optimize=True)
+        moved = simulation.response.output[record.used]
+        error = variance / len(moved) + fit.discrepancy**2 * np.var(moved)
+        return float(np.sqrt(error) / np.ptp(moved))
+
+    @property
+    def effects(self) -> BaseEffects:
+        """How each effect is known, over which drive, frequencies and hold times."""
+        return BaseEffects(_creep(self), _hysteresis(self), _vibration(self))
 
 
 def _range(fit: AxisFit) -> Range:
@@ -125,7 +150,8 @@ def _vibration(known: Knowledge) -> EffectStatus:
         peaks = [np.hypot(real, imag) / damping for _, damping, real, imag in modes]
         return _with_intervals(status, _of_mode(known, int(np.argmax(peaks))))
     row = _row(fit, "lags", fit.layout.lags)
-    if not known.tells(row):
+    shortest = min(one.period for one in fit.records)
+    if not known.tells(row) or row @ fit.theta < shortest:  # as samples are timed no better
         return _unknown("frequency")
     return _with_intervals(status, (known.interval("lag", "s", float(row @ fit.theta), row),))
 

@@ -227,8 +227,18 @@ class NotConverged(Finding):
 
 
 @frozen
+class UncertainScan(Finding):
+    """Records that tell a scan over the whole drive to a ``share`` of its range only."""
+
+    share: float
+
+
+@frozen
 class UnknownStart(Finding):
-    """A record whose initial memory is unknown, so that its first ``seconds`` are not fitted."""
+    """A record whose initial memory is unknown, so that its first ``seconds`` are not fitted.
+
+    Where these are 0, no part of the record is known better, and all of it is.
+    """
 
     record: str
     seconds: float

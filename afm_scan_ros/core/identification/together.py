@@ -12,13 +12,14 @@ from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import known_from
-from afm_scan_ros.core.fit.told import effects_of
+from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.findings import (
     Finding,
     Hum,
     NotConverged,
     NotValidated,
+    UncertainScan,
     UnknownStart,
     ValidationMismatch,
 )
@@ -38,13 +39,15 @@ class FittedAxis:
     """The model of an axis with figures of its fit.
 
     ``operator`` is that of the hysteresis; ``discrepancy`` is η, the model's error over the motion;
-    ``left`` is the rms (m) that the model leaves of each record, by name. ``validation`` is of the
-    record held out, where there is one.
+    ``deviation`` is the standard deviation of a predicted scan over its range (1). ``left`` is the
+    rms (m) that the model leaves of each record, by name. ``validation`` is of the record held out,
+    where there is one.
     """
 
     model: AxisModel
     operator: str
     discrepancy: float
+    deviation: float
     left: Mapping[str, float]
     warnings: tuple[Finding, ...]
     validation: Validation | None
@@ -67,7 +70,8 @@ def identify_together(
         raise InputError("a validation record alone fits nothing: give more records")
     fit = fit_axis(fitting, axis, settings, progress)
     progress("what the records tell of each effect")
-    model = evolve(model_of(fit), effects=effects_of(fit))
+    told = Knowledge.of(fit)
+    model = evolve(model_of(fit), effects=told.effects)
     progress("validating")
     validation = None if held_out is None else error_of(model, held_out, axis)
     known = [] if validation is None else [validation.model_discrepancy]
@@ -79,8 +83,13 @@ def identify_together(
         model=model.also_known(known),
         operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
         discrepancy=fit.discrepancy,
+        deviation=told.of_scan,
         left={r.name: float(np.std(each)) for r, each in zip(fit.records, left, strict=True)},
-        warnings=(*_of_fit(fit), *_of_validation(held_out, validation)),
+        warnings=(
+            *_of_fit(fit),
+            *_of_scan(told.of_scan, settings),
+            *_of_validation(held_out, validation),
+        ),
         validation=validation,
     )
 
@@ -91,8 +100,7 @@ def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
     Raises InputError where the drive leaves the identified range.
     """
     signals = AxisRecord.of(record, axis)
-    near = DEFAULT_SETTINGS.near_end
-    first = known_from(signals.drive, near, depolarised=record.depolarised)
+    first = known_from(signals.drive, DEFAULT_SETTINGS, depolarised=record.depolarised)
     return validate_from(model, signals, record.name, first)
 
 
@@ -101,10 +109,16 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
     for record, tones in zip(fit.records, fit.tone_amplitudes(), strict=True):
         if tones:
             yield Hum(record.name, tones)
-        if record.first:
+        if not record.rested:
             yield UnknownStart(record.name, record.first * record.period)
     if not fit.converged:
         yield NotConverged(fit.remaining)
+
+
+def _of_scan(deviation: float, settings: FitSettings) -> Iterator[Finding]:
+    """Yield that the records do not tell what a scan is, where they do not."""
+    if deviation > settings.poor:
+        yield UncertainScan(deviation)
 
 
 def _of_validation(record: Record | None, result: Validation | None) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from afm_scan_ros.core.fit.signals import (
     longest_block,
     noise_of,
 )
+from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     GAIN,
     PERIOD,
@@ -34,13 +35,22 @@ def test_blocks_are_as_long_as_nothing_turns_within_them() -> None:
 
 
 def test_memory_is_known_from_rest_or_from_both_ends() -> None:
-    path = np.array([0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
-    assert known_from(path, 0.0, depolarised=True) == 0
-    assert known_from(path, 0.0, depolarised=False) == 3
+    path = np.interp(np.arange(2500), 500.0 * np.arange(6), [0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
+    assert known_from(path, SETTINGS, depolarised=True) == 0
+    assert abs(known_from(path, SETTINGS, depolarised=False) - 1500) < 10
 
 
-def test_a_record_whose_memory_is_never_known_is_refused_by_name() -> None:
-    rise = np.linspace(0.0, 1.0, 1000)
+@pytest.mark.parametrize(
+    "path",
+    [np.linspace(0.0, 1.0, 1000), np.repeat([0.0, 2.0], 500), np.linspace(0.0, 1.0, 2000) ** 2],
+)
+def test_a_record_whose_memory_is_never_known_counts_all_the_same(path: Array) -> None:
+    """Else nothing of it would show the gain."""
+    assert known_from(path, SETTINGS, depolarised=False) == 0
+
+
+def test_a_record_of_few_samples_is_refused_by_name() -> None:
+    rise = np.linspace(0.0, 1.0, 150)
     record = afm.Record(rise, GAIN * rise, PERIOD, name="rise")
-    with pytest.raises(InputError, match="rise: its drive reaches the second of its ends only"):
+    with pytest.raises(InputError, match="rise: holds only 150 samples: give a record of 200"):
         fit_axis([record], "x")

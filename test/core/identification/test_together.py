@@ -1,11 +1,16 @@
 """A model from records of any kinds, fitted together: what it predicts, and what it states."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from attrs import evolve
 
+import afm_scan_ros as afm
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
+from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
 from afm_scan_ros.core.identification.findings import NotValidated, UnknownStart
@@ -15,6 +20,7 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import CellGrid, surface_of
+from helpers.fit_cases import OPERATORS, PERIOD, levels, record
 
 LOWER, UPPER = -1.0, 2.5
 SAMPLE_PERIOD = 5e-3
@@ -147,3 +153,18 @@ def test_curves_that_turn_in_part_of_the_drive_predict_those_between() -> None:
     model = forward(found.model, 1.0)
     error = (model.apply(model.at_rest(), fresh)[1] - answer(fresh))[1:]
     assert np.std(error) < 1e-2 * np.ptp(answer(fresh)[1:])
+
+
+@pytest.mark.parametrize(
+    ("operator", "kind"), [("plays", EverettSurface), ("bouc_wen", DuhemSlopes)]
+)
+def test_a_model_of_either_operator_is_saved_and_predicts_the_same(
+    operator: str, kind: type, tmp_path: Path
+) -> None:
+    drive = levels(1, 14, 600)
+    model = afm.identify([record(OPERATORS[operator], drive)])
+    model.save(tmp_path / "model.yaml")
+    loaded = afm.load_model(tmp_path / "model.yaml")
+    assert isinstance(loaded.scanner.axis("x").hysteresis.forward, kind)
+    expected, found = (each.predict(0.9 * drive, PERIOD) for each in (model, loaded))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.ptp(expected))

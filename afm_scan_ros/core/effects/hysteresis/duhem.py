@@ -11,6 +11,7 @@ Source: B. D. Coleman and M. L. Hodgdon, Int. J. Engineering Science 24 (1986) 8
 Ismail, F. Ikhouane and J. Rodellar, Arch. Comput. Methods Eng. 16 (2009) 161, Eqs. 1 to 3.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,10 @@ from afm_scan_ros.core.types import Array, by_value
 
 SMALLEST = 4
 """Coefficients of a cubic spline of one cell."""
+
+
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
 
 
 def _array(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for an array
@@ -53,7 +58,7 @@ class DuhemSlopes:
     upper: float = field(converter=float)
     offset: float = field(converter=float)
     rest: float = field(converter=float)
-    widths: tuple[float, float]
+    widths: tuple[float, float] = field(converter=_ends)
     centre: Array = field(converter=_array, eq=by_value)
     rising: Array = field(converter=_array, eq=by_value)
     falling: Array = field(converter=_array, eq=by_value)

@@ -210,8 +210,8 @@ def record_spectra(
 
 def _periods(signal: Array, period: int) -> Array:
     """Cut a signal, (n, channels), into periods of so many samples, (periods, period, channels)."""
-    count = len(signal) // period if period else 0
-    return signal[: count * period].reshape(count, period, -1)
+    count = len(signal) // period
+    return signal[: count * period].reshape(count, period, signal.shape[1])
 
 
 def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
@@ -220,6 +220,8 @@ def steady_runs(drive: Array) -> list[NDArray[np.int64]]:
 
 
 def _runs(drive: Array, period: int) -> list[NDArray[np.int64]]:
+    if not period:
+        return []
     drives = _periods(drive, period)
     apart = np.abs(np.diff(drives, axis=0)).max(axis=(1, 2), initial=0.0)
     moving = np.ptp(drives[1:], axis=1).max(axis=1, initial=0.0) > 0.0
