@@ -28,7 +28,7 @@ from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.files.paths import path_of
-from afm_scan_ros.report.effect_status_text import left_out
+from afm_scan_ros.report.effect_status_text import unknown_effects
 
 if TYPE_CHECKING:
     from afm_scan_ros.core.coupled_scanner import CoupledScanner
@@ -256,7 +256,7 @@ class Model:
             raise InputError("periodic: only a model of coupled axes predicts steady periods")
 
     def _warn_of_unknown_effects(self) -> None:
-        for sentence in left_out(self.effects):
+        for sentence in unknown_effects(self.effects):
             LOG.warning("%s", sentence)
 
     def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:

@@ -27,7 +27,7 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import Model
-from afm_scan_ros.report.effect_status_text import left_out, status_text
+from afm_scan_ros.report.effect_status_text import status_text, unknown_effects
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
 from afm_scan_ros.report.terminal import say
@@ -170,7 +170,7 @@ def _show_together(axis: str, found: FittedAxis) -> None:
     )
     for record, left in found.left.items():
         say(f"   {record}: {1e9 * left:.3g} nm rms left")
-    _warn((*left_out({axis: found.model.effects}), *map(finding_text, found.warnings)))
+    _warn((*unknown_effects({axis: found.model.effects}), *map(finding_text, found.warnings)))
 
 
 def _show_axis(axis: str, found: AxisIdentification) -> None:

@@ -12,12 +12,12 @@ RECORDS = {
 """What to record, by the kind of record."""
 
 
-def left_out(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
+def unknown_effects(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
     """Yield a sentence for each effect that is unknown, by axis, with what would identify it."""
     for axis, base in effects.items():
         for name, status in base.unknown():
             record = RECORDS[status.identifiable_from]
-            yield f"{axis}: {name} is unknown and left out. Record {record}."
+            yield f"{axis}: {name} is unknown. Record {record}."
 
 
 def status_text(status: EffectStatus, drive: str = "V") -> str:

@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged, signals_of
+from afm_scan_ros.core.fit.signals import averaged, correlated, signals_of
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import ProgressCallback
 
@@ -102,6 +102,8 @@ def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit of the greater evidence; one state that diverges is none of the scanner's.
 
     Where plays leave nothing but the sensor's noise, no other operator can be seen to do better.
+    Residuals that neighbouring blocks have in common count once, and one state has to be as clear
+    as a mode: without an effect to be seen, the operator is the paper's.
     """
     if plays.at_noise:
         progress("plays leave nothing but noise")
@@ -113,8 +115,10 @@ def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     except ScanError as error:
         progress(f"one state: {error}")
         return plays
-    better, chosen = (plays, "plays") if margin > 0.0 else (other, "one state")
-    progress(f"the hysteresis is of {chosen}, by {abs(margin):.3g} nat")
+    clear_margin = margin / max(map(correlated, plays.residuals(plays.simulated(plays.theta))))
+    clearly = -clear_margin > plays.layout.settings.mode_chance
+    better, chosen = (other, "one state") if clearly else (plays, "plays")
+    progress(f"the hysteresis is of {chosen}: plays have {clear_margin:.3g} nat more evidence")
     return better
 
 

@@ -48,7 +48,8 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
 
     Where ``searching``, the scales of the greatest evidence are chosen first, if the last step
     showed the objective to be as quadratic as that evidence takes it to be. A parameter that would
-    fall below its lowest value stays there for this step.
+    fall below its lowest value stays there for this step, and so does a map behind the operator
+    that would turn back on every step.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in groups or fit.layout.parts:
@@ -61,8 +62,13 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     right -= precision @ (fit.theta - mean)
     whole = fit.layout.conditioned(matrix + precision)
     metric = _metric(fit.layout, matrix, precision)
-    equations = _Equations(whole, right, free, held, metric)
-    return _descend(fit, _growing(fit, equations) if fit.grows else equations)
+    equations, damping = _Equations(whole, right, free, held, metric), fit.damping
+    fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
+    mapped = fit.layout.parts["map"]
+    if fell == 0.0 and free[mapped].any():
+        free[mapped], fit.damping = False, damping
+        fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
+    return fell
 
 
 def _metric(layout: Layout, matrix: Array, precision: Array) -> Array:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
+from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -124,6 +125,19 @@ def noise_of(signal: Array) -> float:
     third = np.diff(signal, 3)
     robust = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
     return float(max(robust, float(np.finfo(np.float32).eps) * float(np.ptp(signal))))
+
+
+def correlated(residual: Array) -> float:
+    """Number of neighbouring samples (n,) that tell no more than one: the correlations' sum.
+
+    It ends where they first are noise's, below 2 / √n.
+    """
+    count = len(residual)
+    spectrum = np.abs(rfft(residual - residual.mean(), 2 * count)) ** 2
+    correlations = irfft(spectrum)[:count]
+    correlations /= max(correlations[0], np.finfo(float).tiny)
+    last = int(np.argmax(correlations < 2.0 / np.sqrt(count)))
+    return float(1.0 + 2.0 * correlations[1:last].sum())
 
 
 def longest_block(drive: Array, displacement: Array, noise: float, settings: FitSettings) -> int:

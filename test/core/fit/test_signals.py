@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.signals import (
+    correlated,
     known_from,
     longest_block,
     noise_of,
@@ -32,6 +34,14 @@ def test_blocks_are_as_long_as_nothing_turns_within_them() -> None:
     long = longest_block(slow, moved, 1e-3, SETTINGS)
     short = longest_block(np.sin(np.linspace(0.0, 600.0, 100_000)), moved, 1e-3, SETTINGS)
     assert long >= 32 > short
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.9])
+def test_neighbours_count_once_as_far_as_they_are_alike(kept: float) -> None:
+    """Of an autoregression of order one the correlations are a geometric series."""
+    noise = np.random.default_rng(3).standard_normal(100_000)
+    alike = signal.lfilter([1.0], [1.0, -kept], noise)
+    assert correlated(alike) == pytest.approx((1.0 + kept) / (1.0 - kept), rel=0.1)
 
 
 def test_memory_is_known_from_rest_or_from_both_ends() -> None:

@@ -87,8 +87,8 @@ class Study:
     @property
     def fitted(self) -> float:
         """Rms misfit, m, to all data fitted."""
-        joint = self.model.fit.joint["x"].joint
-        return np.nan if joint is None else joint.fitted
+        left = self.model.fit.together["x"].left
+        return float(np.sqrt(np.mean(np.square(list(left.values())))))
 
     @cached_property
     def twin(self) -> Model:
