@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from afm_scan_ros import identification as api
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
 from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.record import Record
@@ -78,8 +79,7 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     one = imported(tmp_path, slow, "x")
     other = imported(tmp_path, waves, "y")
     out = tmp_path / "model.yaml"
-    words = [one, "--frequency", other, str(bag(tmp_path, loops))]
-    words += ["--levels", str(LEVELS), "--out", str(out)]
+    words = [one, "--frequency", other, str(bag(tmp_path, loops)), "--out", str(out)]
     result = CliRunner().invoke(identify, words, catch_exceptions=False)
     assert result.exit_code == 0
     model = load_model(out)
@@ -99,7 +99,13 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     resonance = next(e for e in known["y", "vibration"].intervals if e.name == "resonance")
     assert resonance.lower < 453.936 < resonance.upper
     assert "All records were fitted" in result.output
-    assert json.loads(out.with_suffix(".fit.json").read_text("utf-8"))["x"]["held_out_rms_m"] > 0.0
+    report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
+    assert 0.0 < report["x"]["scan_deviation_over_range"] < 0.01
+
+
+def test_sizes_of_the_identification_in_turns_are_refused_elsewhere(records: list[Record]) -> None:
+    with pytest.raises(InputError, match=r"y: levels, order and delay are of .*: leave them out"):
+        api.identify([records[1].axis("y")], levels=LEVELS)
 
 
 @pytest.mark.evidence
