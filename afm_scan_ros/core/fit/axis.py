@@ -16,7 +16,7 @@ from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import averaged, correlated, signals_of
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback
 
 
 def fit_axis(
@@ -143,8 +143,7 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
     """Return a fit of no hysteresis, creep or vibration, and the gain of a straight line."""
     given = [record.axis(axis) for record in records if axis in record.axes]
     drives = [record.drive[:, 0] for record in given]
-    ends = min(map(np.min, drives), default=0.0), max(map(np.max, drives), default=0.0)
-    operator = Plays(*ends, settings)
+    operator = Plays(*_range_of(drives, settings), settings)
     if operator.half == 0.0:
         raise InputError(f"no record moves {axis}: give one whose drive changes")
     signals = [
@@ -164,6 +163,14 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
     moved = np.concatenate([one.displacement - one.displacement.mean() for one in signals])
     gain = float(driven @ moved / (driven @ driven))
     return AxisFit(layout, signals, gain, layout.start())
+
+
+def _range_of(drives: Sequence[Array], settings: FitSettings) -> tuple[float, float]:
+    """Range (V) of all drives, and of rest at 0 V where that is near."""
+    low, high = min(map(np.min, drives), default=0.0), max(map(np.max, drives), default=0.0)
+    margin = settings.rest_margin * (high - low)
+    near = low <= margin and high >= -margin
+    return (min(low, 0.0), max(high, 0.0)) if near else (low, high)
 
 
 def _first_mode(fit: AxisFit) -> FoundMode | None:

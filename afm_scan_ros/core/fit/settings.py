@@ -363,6 +363,12 @@ class FitSettings:
         "distance from an end of the drive at which it has been there",
         "fifty samples a cycle miss the top of a sine by 0.2 %",
     )
+    rest_margin: float = setting(
+        0.1,
+        "range of the drive",
+        "distance at which 0 V, where scanners rest, belongs to the range of a model all the same",
+        "an operator hardly changes over a tenth of its range",
+    )
     fewest_blocks: int = setting(
         200,
         "1",

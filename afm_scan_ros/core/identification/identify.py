@@ -170,8 +170,10 @@ def _naming(axis: str) -> Iterator[None]:
     """Begin what is raised by the axis' name."""
     try:
         yield
-    except (InputError, ScanError) as error:
-        raise type(error)(f"{axis}: {error}") from error
+    except InputError as error:
+        raise InputError(f"{axis}: {error}") from error
+    except ScanError as error:
+        raise ScanError(f"{axis}: {error}") from error
 
 
 @contextmanager

@@ -73,6 +73,17 @@ def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
     np.testing.assert_allclose(np.std(drawn, axis=0)[100:], stated[100:], rtol=0.3)
 
 
+def test_a_discrepancy_of_a_small_part_of_the_noise_is_none() -> None:
+    drive = levels(4, 6, 300)
+    noise = np.random.default_rng(5).normal(0.0, 1e-8, len(drive))
+    fit = AxisFit(*of_plays_alone(drive, GAIN * drive + noise))
+    (one,) = fit.records
+    lost, alone = SETTINGS.lost, one.noise / np.sqrt(one.block) / one.motion
+    for share, expected in ((0.9 * lost, True), (1.1 * lost, False)):
+        fit.discrepancy = alone * np.sqrt(share / (1.0 - share))
+        assert fit.at_noise == expected
+
+
 def test_a_prediction_begins_at_rest_and_stays_within_the_records_drive() -> None:
     drive = levels(4, 6, 300)
     fit = AxisFit(*of_plays_alone(drive, GAIN * drive))

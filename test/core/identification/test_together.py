@@ -13,14 +13,19 @@ from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
-from afm_scan_ros.core.identification.findings import NotValidated, UnknownStart
+from afm_scan_ros.core.identification.findings import (
+    Hum,
+    NotValidated,
+    UncertainScan,
+    UnknownStart,
+)
 from afm_scan_ros.core.identification.together import FittedAxis, identify_together
 from afm_scan_ros.core.model import ParameterInterval, Status
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import CellGrid, surface_of
-from helpers.fit_cases import OPERATORS, PERIOD, levels, record
+from helpers.fit_cases import CREEP, OPERATORS, PERIOD, displaced, levels, record
 
 LOWER, UPPER = -1.0, 2.5
 SAMPLE_PERIOD = 5e-3
@@ -107,6 +112,12 @@ def test_fresh_loops_of_another_rate_are_predicted_close_to_the_noise(fit: Fitte
     assert error_on(fit, FRESH) < NOISE
 
 
+def test_a_scan_is_as_uncertain_as_is_stated(fit: FittedAxis) -> None:
+    """Of a fresh motion over nine tenths of the drive, within a factor of three."""
+    error = error_on(fit, FRESH) / float(np.ptp(moved(FRESH)))
+    assert error / 3.0 < fit.deviation < 3.0 * error
+
+
 def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
     assert fit.validation is not None
     known, *fitted = fit.model.model_discrepancies
@@ -168,3 +179,31 @@ def test_a_model_of_either_operator_is_saved_and_predicts_the_same(
     assert isinstance(loaded.scanner.axis("x").hysteresis.forward, kind)
     expected, found = (each.predict(0.9 * drive, PERIOD) for each in (model, loaded))
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.ptp(expected))
+
+
+def test_steps_alone_tell_creep_and_not_hysteresis() -> None:
+    period = 0.01
+    drive = np.repeat([0.0, 0.6, 1.2, 0.3], [500, 3000, 3000, 3000])
+    noise = np.random.default_rng(8).normal(0.0, 1e-9, len(drive))
+    measured_there = displaced(OPERATORS["bouc_wen"], drive, period) + noise
+    steps = Record(drive, measured_there, period, start="depolarised", name="steps")
+    found = identify_together([steps], "x", lambda _: None)
+    statuses = {name: each.status for name, each in found.model.effects.each()}
+    assert statuses == {
+        "creep": Status.IDENTIFIED,
+        "hysteresis": Status.UNKNOWN,
+        "vibration": Status.UNKNOWN,
+    }
+    (interval,) = found.model.effects.creep.intervals
+    assert within(interval, CREEP[0])
+    (finding,) = (each for each in found.warnings if isinstance(each, UncertainScan))
+    assert finding.share == found.deviation
+
+
+def test_hum_in_a_record_is_named_with_its_amplitude() -> None:
+    tone = 20e-9
+    found = identify_together([record(OPERATORS["plays"], levels(1, 14, 600), tone)], "x", print)
+    (hum,) = (each for each in found.warnings if isinstance(each, Hum))
+    ((frequency, amplitude),) = hum.lines
+    assert frequency == pytest.approx(50.02, abs=0.15)  # half a bin of 3.3 s
+    assert amplitude == pytest.approx(tone, rel=0.1)
