@@ -75,27 +75,21 @@ def _otherwise(converged: Converged) -> Mapping[str, FrequencyResponse]:
     return {f"{grid.size} levels": response_to(finer.operator, turns.frequency)}
 
 
-def spanning(
-    fit: RationalFit, others: Iterable[RationalFit], coarser: Iterable[RationalFit] = ()
-) -> RationalFit:
+def spanning(fit: RationalFit, others: Iterable[RationalFit]) -> RationalFit:
     """Return the fit with intervals that span what the others find, and the scatter beyond.
 
-    As far as ``coarser`` surfaces lead astray to one side, no width at all may lead to the other.
     Where one of them has a pole or zero below all lines, the record does not give the gain at rest.
     """
-    others, coarser = tuple(others), tuple(coarser)
+    others = tuple(others)
     figures = np.array([fit.resonance, fit.damping, fit.gain_ratio])
     away = [_figures(each, fit) - figures for each in others]
-    for each in coarser:
-        apart = _figures(each, fit) - figures
-        away += [apart, -apart]
     reach = np.array([np.zeros(3), *away])
     below, above = reach.min(axis=0), reach.max(axis=0)
     intervals = fit.resonance_interval, fit.damping_interval, fit.gain_interval
     resonance, damping, gain = (
         (low + float(below[k]), high + float(above[k])) for k, (low, high) in enumerate(intervals)
     )
-    if not all(each.identifies_gain for each in (fit, *others, *coarser)):
+    if not all(each.identifies_gain for each in (fit, *others)):
         gain = (-np.inf, np.inf)
     return evolve(fit, resonance_interval=resonance, damping_interval=damping, gain_interval=gain)
 

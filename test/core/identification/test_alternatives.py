@@ -65,13 +65,6 @@ def test_another_mode_that_peaks_higher_widens_nothing() -> None:
     assert found.model == FIT.model
 
 
-def test_what_coarser_cells_miss_to_one_side_finer_ones_may_to_the_other() -> None:
-    coarser = shifted(frequency=1.0 + 1.0 / FIT.resonance)
-    low, high = FIT.resonance_interval
-    found = spanning(FIT, [], [coarser])
-    assert found.resonance_interval == pytest.approx((low - 1.0, high + 1.0), rel=1e-9)
-
-
 def test_a_gain_that_a_pole_below_all_lines_may_change_is_open() -> None:
     slow = np.poly([-2.0 * np.pi * 0.5 * FIT.band[0]])
     denominator = tuple(map(float, np.polymul(FIT.model.denominator, slow)))

@@ -13,7 +13,6 @@ from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
     ReversalCurve,
     ReversalCurves,
-    missing_turns,
     reversal_curves,
     turning_points,
 )
@@ -98,7 +97,6 @@ def test_missing_curves_are_refused_by_the_levels_beside_them() -> None:
     levels = np.linspace(-1.0, 1.0, 21)
     gap = path(-1.0, *np.column_stack([np.delete(levels[1:], [7, 8]), -np.ones(18)]).ravel())
     refuses(gap, "no curve turns between -0.3 V and 0 V")
-    assert missing_turns(gap) == pytest.approx((-0.3, 0.0))
 
 
 @pytest.mark.parametrize("first", range(5))
@@ -106,18 +104,11 @@ def test_every_fifth_curve_may_be_left_out(first: int) -> None:
     levels = np.append(np.delete(np.linspace(-0.9, 0.9, 19), slice(first, None, 5)), 1.0)
     drive = path(-1.0, *np.column_stack([levels, -np.ones(len(levels))]).ravel())
     assert len(reversal_curves(drive).falling) == len(levels)
-    assert missing_turns(drive) is None
 
 
 def test_family_that_stops_short_of_the_other_saturation_is_refused() -> None:
     short = path(-1.0, 0.5, -1.0, 0.0, -1.0, -0.5, -1.0, 1.0, 0.9, 0.95)
     refuses(short, "no curve turns between 0.5 V and 1 V")
-
-
-def test_scans_and_growing_sines_are_no_curves_that_lack_some() -> None:
-    time = np.linspace(0.0, 20.0, 4000)
-    assert missing_turns(np.sin(2.0 * np.pi * time)) is None
-    assert missing_turns(time * np.sin(2.0 * np.pi * time)) is None
 
 
 def test_end_of_a_record_without_a_tail_is_its_end() -> None:

@@ -134,16 +134,6 @@ def reversal_curves(drive: Array) -> ReversalCurves:
     return ReversalCurves(_sorted(falling, drive), _sorted(rising, drive), end)
 
 
-def missing_turns(drive: Array) -> tuple[float, float] | None:
-    """Stretch (V) in which none of what are reversal curves turns; None where there is no such.
-
-    ``drive`` is in V, shape (n,).
-    """
-    falling, rising = _families(drive, turning_points(drive))
-    most = max(len(_levels(drive, spans)) for spans in (falling, rising))
-    return _gap(drive, falling, rising) if most >= TURNS else None
-
-
 def _near(drive: Array) -> float:
     return ON_SATURATION * float(np.ptp(drive))
 

@@ -11,7 +11,6 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
@@ -19,7 +18,6 @@ from afm_scan_ros.features.images.loops.density import (
     CellGrid,
     NormalEquations,
     solve,
-    surface_of,
 )
 from afm_scan_ros.features.images.loops.moving import (
     LinearDynamics,
@@ -59,10 +57,8 @@ class JointFit:
     ``vibration`` and ``creep`` hold the intervals of what was sought and identified of them; None
     where the records do not identify it, or where it was known. ``fitted`` is the rms misfit (m) to
     the rows fitted, ``held_out`` that of each part under a fit of the others, on the coarse grid.
-    ``coarser`` is the surface of a grid of ``FINER`` cells, whose weights are in m.
     """
 
-    coarser: EverettSurface
     weights: Array
     grid: CellGrid
     dynamics: LinearDynamics
@@ -71,12 +67,6 @@ class JointFit:
     smoothing: float
     fitted: float
     held_out: float
-
-    def at_once(self, period: float) -> "JointFit":
-        """Return the fit with no vibration that shows in samples of a ``period`` (s)."""
-        return evolve(
-            self, dynamics=evolve(self.dynamics, vibration=_still(period)), vibration=None
-        )
 
 
 @frozen(eq=False)
@@ -110,9 +100,7 @@ def fit_jointly(
     solution = _sought(records, grids, vibration, creep, WEAK_SMOOTHING)
     progress("fitting the hysteresis")
     grid = grid_of(records, FINE)
-    coarser = _weights(grids[1], solution)[0]
-    surface = surface_of(coarser, grid_of(records, FINER), 0.0)
-    found = _fitted(swept(records, grid), grid, solution, surface)
+    found = _fitted(swept(records, grid), grid, solution)
     if rings is None:
         return found
     return evolve(found, vibration=rings.intervals)
@@ -134,12 +122,9 @@ def _weights(records: Iterable[Swept], solution: _Solution) -> tuple[Array, floa
     return weights, whole.rms(weights)
 
 
-def _fitted(
-    records: Iterable[Swept], grid: CellGrid, solution: _Solution, coarser: EverettSurface
-) -> JointFit:
+def _fitted(records: Iterable[Swept], grid: CellGrid, solution: _Solution) -> JointFit:
     weights, residual = _weights(records, solution)
     return JointFit(
-        coarser=coarser,
         weights=weights,
         grid=grid,
         dynamics=solution.dynamics,

@@ -32,9 +32,8 @@ PIECES = 8
 class MovingRecord:
     """Drive (V) and displacement (m), both (n,), of a record in which the scanner moves.
 
-    ``depolarised`` is whether it begins so, at rest at zero, ``saturates`` whether the ends of its
-    drive are saturations, as reversal curves leave. Where not ``measured`` (n,), the displacement
-    counts nothing; None where all of it is. Raises InputError where the drive rests.
+    ``depolarised`` is whether it begins so, at rest at zero. Where not ``measured`` (n,), the
+    displacement counts nothing; None where all of it is. Raises InputError where the drive rests.
     """
 
     name: str
@@ -42,7 +41,6 @@ class MovingRecord:
     displacement: Array
     sample_period: float
     depolarised: bool = False
-    saturates: bool = False
     measured: NDArray[np.bool_] | None = None
 
     def __attrs_post_init__(self) -> None:
@@ -65,8 +63,8 @@ class MovingRecord:
         """First sample from which on the memory is known, whatever it was at the start.
 
         Once both ends of the record's drive were visited, all that lies between them is written
-        anew, and what lies beyond them rests. A saturation writes everything. That holds of drives
-        of one sign too: a first rise from depolarised rest is higher than those that follow.
+        anew, and what lies beyond them rests. That holds of drives of one sign too: a first rise
+        from depolarised rest is higher than those that follow.
         """
         if self.depolarised:
             return 0
@@ -76,7 +74,7 @@ class MovingRecord:
             self.drive <= self.drive.min() + near,
         )
         first = [int(np.argmax(end)) for end in ends]
-        return min(first) if self.saturates else max(first)
+        return max(first)
 
 
 @frozen
