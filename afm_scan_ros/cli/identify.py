@@ -166,7 +166,8 @@ def _show_together(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
         say(f"{axis}: {effect}: {status_text(status)}")
     say(
-        f"   hysteresis by {found.operator}; the model's error is {found.discrepancy:.2%} of motion"
+        f"   hysteresis by {found.operator}; a scan is predicted to {found.deviation:.2%} of its"
+        " range (standard deviation)"
     )
     for record, left in found.left.items():
         say(f"   {record}: {1e9 * left:.3g} nm rms left")

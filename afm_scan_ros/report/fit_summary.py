@@ -61,6 +61,9 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.NotConverged: "The fit has not converged: the likelihood may still grow by"
     " {remaining:.3g} nat, so the intervals do not hold. Give further records, of other sizes and"
     " rates.",
+    found.ReadAfterUpdate: "The displacement in {record} follows a step of its drive within that"
+    " sample, so each was taken as read after the drive's update. The model predicts what is read"
+    " just before it: compare its predictions with the next sample.",
     found.UncertainScan: "The records tell a scan over the whole drive to {share:.1%} of its range"
     " only (one standard deviation). Add triangles or loops over the whole drive, of several"
     " amplitudes.",

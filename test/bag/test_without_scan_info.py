@@ -15,6 +15,7 @@ from afm_scan_ros.bag.scan_info import TYPE as SCAN_INFO
 from afm_scan_ros.bag.writer import BagWriter
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.diagnosis import search
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
@@ -132,8 +133,8 @@ def test_a_model_is_identified_from_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     drive = np.repeat([0.0, 1.0, 0.0], [500, 4000, 500])
-    late = PERIOD * 20.0 * np.arange(-500.0, 4500.0)
-    moved = 5e-6 * drive * (1.2 - 0.2 * np.exp(-np.maximum(late, 0.0) / 10.0))
+    creep = Creep(CreepModel((0.2,), (10.0,)), 20.0 * PERIOD)
+    moved = 5e-6 * creep.apply(creep.at_rest(), drive)[1]
     moved += 2e-9 * np.random.default_rng(1).standard_normal(len(drive))
     info = evolve(INFO, sample_period=20.0 * PERIOD)
     with BagWriter(tmp_path / "bag") as writer:

@@ -259,8 +259,9 @@ def test_a_ramp_that_hangs_is_named_and_ended(opened: Open) -> None:
     driver = opened("faulty:Hanging", rest=SILENCE, call="ramp_down", locked=True)
     driver.advance(drive(0, 10), last=False)
     assert driver.answer(PATIENCE) is not None
-    said = "interrupted; the driver has not said that the drive is at rest"
-    assert driver.ramp_down("interrupted") == said
+    said = driver.ramp_down("interrupted")
+    watched = f"interrupted; {KILLED}"  # where the process is ended before the wait for its word is
+    assert said in {"interrupted; the driver has not said that the drive is at rest", watched}
     driver.close()
 
 

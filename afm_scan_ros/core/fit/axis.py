@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged, correlated, signals_of
+from afm_scan_ros.core.fit.signals import averaged, correlated, in_step, signals_of
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
 
@@ -142,7 +142,7 @@ def _margin(one: AxisFit, other: AxisFit) -> float:
 def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:
     """Return a fit of no hysteresis, creep or vibration, and the gain of a straight line."""
     given = [record.axis(axis) for record in records if axis in record.axes]
-    drives = [record.drive[:, 0] for record in given]
+    drives = [in_step(one.drive[:, 0], one.displacement[:, 0], settings) for one in given]
     operator = Plays(*_range_of(drives, settings), settings)
     if operator.half == 0.0:
         raise InputError(f"no record moves {axis}: give one whose drive changes")

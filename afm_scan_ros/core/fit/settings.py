@@ -363,6 +363,12 @@ class FitSettings:
         "distance from an end of the drive at which it has been there",
         "fifty samples a cycle miss the top of a sine by 0.2 %",
     )
+    read_after: float = setting(
+        5.0,
+        "standard deviations",
+        "share of the drive's change that a displacement follows in its own sample, over zero",
+        "by chance once in a million records",
+    )
     rest_margin: float = setting(
         0.1,
         "range of the drive",

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.errors import InputError
@@ -107,6 +108,35 @@ def signals_of(
         )
     first = known_from(drive, settings, depolarised=depolarised)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise)
+
+
+def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:
+    """Whether a displacement follows steps of its drive within their own sample.
+
+    Such a record was read after the drive's update. One that is read just before it shows nothing
+    of a step yet. Steps are what follows rest; they are to make most of the drive's way.
+    """
+    change, moved = np.diff(drive), np.diff(displacement)
+    rests = np.concatenate([[True], change[:-1] == 0.0])
+    steps = np.flatnonzero((change != 0.0) & rests)
+    if np.abs(change[steps]).sum() <= 0.5 * np.abs(change).sum():
+        return False
+    size = float(change[steps] @ change[steps])
+    seen, later = (float(change[steps] @ each) / size for each in _after(moved, steps))
+    noise = np.sqrt(2.0 / size) * noise_of(displacement)
+    return bool(abs(seen) > max(settings.read_after * noise, 0.5 * abs(seen + later)))
+
+
+def _after(moved: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:
+    """What moves in the sample of a step, and in the one after."""
+    return moved[steps], np.append(moved, 0.0)[steps + 1]
+
+
+def in_step(drive: Array, displacement: Array, settings: FitSettings) -> Array:
+    """Return a drive (V), (n,), as it led to the displacement read just before its next update."""
+    if not reads_after(drive, displacement, settings):
+        return drive
+    return np.append(drive[1:], drive[-1])
 
 
 def averaged(signal: Array, block: int) -> Array:

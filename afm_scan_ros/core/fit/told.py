@@ -1,9 +1,10 @@
 """What the records tell of each effect: whether they do, and the intervals of its parameters.
 
 The posterior of a linear combination r of θ has the variance r (H + Λ)⁻¹ rᵀ. An effect is
-identified where the records narrow its measure, from what is expected beforehand at the greatest
-scales, to less than a share ``told`` of that: the sum of the gains of creep, the opening of the
-loop over the whole range, or the mean lag where no mode is seen.
+identified where its measure has, at the greatest scales, less than a share ``told`` of the standard
+deviation expected beforehand. That measure is the opening of the loop over the whole range, the
+mean lag where no mode is seen, and the sum of the gains of creep, of which a decade is expected.
+Creep is identified too where its interval excludes none.
 """
 
 import numpy as np
@@ -50,9 +51,13 @@ class Knowledge:
         sums = (layout.conditioned(one) for one in (matrix + own, matrix + wide, wide))
         return cls(fit, *map(_inverse, sums))
 
-    def tells(self, row: Array) -> bool:
-        """Whether the records narrow a combination of θ, (size,), far enough."""
+    def tells(self, row: Array, expected: float | None = None) -> bool:
+        """Whether the records narrow a combination of θ, (size,), far enough.
+
+        It is ``expected`` within that standard deviation, or within the prior's.
+        """
         after, before = (float(row @ each @ row) for each in (self.widest, self.beforehand))
+        before = before if expected is None else expected**2
         return after < self.fit.layout.settings.told**2 * before
 
     def interval(self, name: str, unit: str, value: float, row: Array) -> ParameterInterval:
@@ -106,14 +111,16 @@ def _unknown(kind: str) -> EffectStatus:
 
 def _creep(known: Knowledge) -> EffectStatus:
     fit = known.fit
-    row = _row(fit, "creep", 1.0)
-    if not known.tells(row):
+    row, settings = _row(fit, "creep", 1.0), fit.layout.settings
+    interval = known.interval("gain", "1", float(row @ fit.theta), row)
+    told = known.tells(row, settings.creep * settings.creep_per_decade)
+    if not told and interval.lower == 0.0:
         return _unknown("creep")
     longest = max(len(one.drive) * one.period for one in fit.records)
     return EffectStatus(
         drive=_range(fit),
         hold_times=(float(fit.layout.time_constants[0]), longest),
-        intervals=(known.interval("gain", "1", float(row @ fit.theta), row),),
+        intervals=(interval,),
     )
 
 

@@ -227,6 +227,13 @@ class NotConverged(Finding):
 
 
 @frozen
+class ReadAfterUpdate(Finding):
+    """A record whose displacement follows a step of its drive within that sample."""
+
+    record: str
+
+
+@frozen
 class UncertainScan(Finding):
     """Records that tell a scan over the whole drive to a ``share`` of its range only."""
 

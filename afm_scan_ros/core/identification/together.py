@@ -11,7 +11,7 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import known_from
+from afm_scan_ros.core.fit.signals import in_step, known_from, reads_after
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.findings import (
@@ -19,6 +19,7 @@ from afm_scan_ros.core.identification.findings import (
     Hum,
     NotConverged,
     NotValidated,
+    ReadAfterUpdate,
     UncertainScan,
     UnknownStart,
     ValidationMismatch,
@@ -76,7 +77,7 @@ def identify_together(
     validation = None if held_out is None else error_of(model, held_out, axis)
     known = [] if validation is None else [validation.model_discrepancy]
     for one in fitting:
-        error = validate_from(model, AxisRecord.of(one, axis), one.name, 0).model_discrepancy
+        error = validate_from(model, _in_step(one, axis), one.name, 0).model_discrepancy
         known.append(of_fitted(error, fit.discrepancy))
     left = fit.residuals(fit.simulated(fit.theta))
     return FittedAxis(
@@ -86,6 +87,7 @@ def identify_together(
         deviation=told.of_scan,
         left={r.name: float(np.std(each)) for r, each in zip(fit.records, left, strict=True)},
         warnings=(
+            *_read_after(records, axis),
             *_of_fit(fit),
             *_of_scan(told.of_scan, settings),
             *_of_validation(held_out, validation),
@@ -99,9 +101,22 @@ def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
 
     Raises InputError where the drive leaves the identified range.
     """
-    signals = AxisRecord.of(record, axis)
+    signals = _in_step(record, axis)
     first = known_from(signals.drive, DEFAULT_SETTINGS, depolarised=record.depolarised)
     return validate_from(model, signals, record.name, first)
+
+
+def _in_step(record: Record, axis: str) -> AxisRecord:
+    """Return an axis of a record as it were read just before its drive's updates."""
+    drive, moved = record.signals(axis)
+    return AxisRecord(in_step(drive, moved, DEFAULT_SETTINGS), moved, record.sample_period)
+
+
+def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
+    """Yield the records that were not."""
+    for one in records:
+        if reads_after(*one.signals(axis), DEFAULT_SETTINGS):
+            yield ReadAfterUpdate(one.name)
 
 
 def _of_fit(fit: AxisFit) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.signals import (
     correlated,
+    in_step,
     known_from,
     longest_block,
     noise_of,
@@ -16,8 +17,11 @@ from afm_scan_ros.core.fit.signals import (
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     GAIN,
+    OPERATORS,
     PERIOD,
     SETTINGS,
+    displaced,
+    levels,
 )
 
 
@@ -42,6 +46,23 @@ def test_neighbours_count_once_as_far_as_they_are_alike(kept: float) -> None:
     noise = np.random.default_rng(3).standard_normal(100_000)
     alike = signal.lfilter([1.0], [1.0, -kept], noise)
     assert correlated(alike) == pytest.approx((1.0 + kept) / (1.0 - kept), rel=0.1)
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_a_record_of_steps_shows_whether_it_was_read_after_the_update(late: int) -> None:
+    drive = np.repeat([0.0, 2.0, 0.5, 1.5], 200)
+    noise = 1e-9 * np.random.default_rng(9).standard_normal(len(drive))
+    moved = GAIN * np.concatenate([np.zeros(late), drive])[: len(drive)] + noise
+    given = in_step(drive, moved, SETTINGS)
+    expected = drive if late else np.append(drive[1:], drive[-1])
+    np.testing.assert_array_equal(given, expected)
+
+
+def test_no_other_record_is_taken_for_one_read_after_the_update() -> None:
+    """Of a resonance, its first samples follow in any way."""
+    drive = levels(3, 10, 300)
+    moved = displaced(OPERATORS["plays"], drive)
+    assert in_step(drive, moved, SETTINGS) is drive
 
 
 def test_memory_is_known_from_rest_or_from_both_ends() -> None:
