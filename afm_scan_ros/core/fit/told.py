@@ -14,7 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
-from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.signals import Signals, correlated
 from afm_scan_ros.core.model import (
     BaseEffects,
     EffectStatus,
@@ -43,12 +43,14 @@ class Knowledge:
 
     @classmethod
     def of(cls, fit: AxisFit) -> "Knowledge":
-        """Invert the normal equations of a fit."""
-        layout = fit.layout
+        """Invert the normal equations of a fit; residuals that neighbours share count once."""
+        layout, lefts = fit.layout, fit.residuals(fit.simulated(fit.theta))
+        alike = np.average([correlated(one) for one in lefts], weights=[len(one) for one in lefts])
         greatest = {name: getattr(layout.settings, name) for name in SEARCHED}
         matrix, _ = fit.normal(with_operator=True)
         own, wide = (layout.prior(scales, fit.theta)[0] for scales in (fit.scales, greatest))
-        sums = (layout.conditioned(one) for one in (matrix + own, matrix + wide, wide))
+        told = matrix / alike
+        sums = (layout.conditioned(one) for one in (told + own, told + wide, wide))
         return cls(fit, *map(_inverse, sums))
 
     def tells(self, row: Array, expected: float | None = None) -> bool:
