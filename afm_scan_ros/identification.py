@@ -96,8 +96,8 @@ def identify(
     Returns
     -------
     Model
-        ``Model.effects`` states what the records identify; all else is unknown, and is left out of
-        predictions and inverses.
+        ``Model.effects`` states what the records identify; all else is unknown, and is in the model
+        as it was expected before the records were taken.
 
     Raises
     ------

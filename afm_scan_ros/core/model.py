@@ -1,7 +1,7 @@
 """What is believed of a scanner: its effects, how each is known, and the model's error.
 
-An effect that is unknown stands in the model as if it were absent: no creep, a hysteresis that is
-a straight line, a vibration that is faster than the records could show.
+An effect that is unknown stands in the model as it was expected before the records were taken:
+nearly absent, with no creep to speak of, and a hysteresis close to a straight line.
 
 A residual below the model discrepancy shows no missing effect.
 

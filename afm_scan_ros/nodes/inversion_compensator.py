@@ -39,7 +39,7 @@ class InversionCompensator(BlockConsumer):
         self._model = model_of(self.settings)
         for axis in self._model.axes:
             for effect, _ in self._model.axis(axis).effects.unknown():
-                self.get_logger().warning(f"{axis}: the model does not know {effect}: left out")
+                self.get_logger().warning(f"{axis}: the records of the model do not tell {effect}")
         self._inversion: ScanInversion
         self._moved_at = 0.0
         self._given = inversion_settings(self.settings)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged, correlated, in_step, signals_of
+from afm_scan_ros.core.fit.signals import averaged, correlation_length, in_step, signals_of
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
 
@@ -41,14 +41,14 @@ def fit_axis(
     Returns
     -------
     AxisFit
-        Its operator is plays where these leave nothing but noise, or else that of plays and one
-        state which has the greater evidence.
+        Its operator is plays, unless these leave more than noise and one state has clearly the
+        greater evidence.
 
     Raises
     ------
     InputError
-        Where no record moves, for a record whose memory is never known, and for one that is of
-        another scanner than the others or has its columns exchanged.
+        Where no record moves, and for a record that is too short, of another scanner than the
+        others, or has its columns exchanged.
     ScanError
         Where the fit diverges.
     """
@@ -99,11 +99,11 @@ def _fit_plays(fit: AxisFit) -> None:
 
 
 def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
-    """Return the fit of the greater evidence; one state that diverges is none of the scanner's.
+    """Return the fit by plays, the paper's operator, or by one state where that is clearly better.
 
     Where plays leave nothing but the sensor's noise, no other operator can be seen to do better.
-    Residuals that neighbouring blocks have in common count once, and one state has to be as clear
-    as a mode: without an effect to be seen, the operator is the paper's.
+    The evidence is that of independent residuals, so it is divided by their correlation length, and
+    one state has to be as clear as a mode. One state that diverges is none of the scanner's.
     """
     if plays.at_noise:
         progress("plays leave nothing but noise")
@@ -115,11 +115,12 @@ def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     except ScanError as error:
         progress(f"one state: {error}")
         return plays
-    clear_margin = margin / max(map(correlated, plays.residuals(plays.simulated(plays.theta))))
-    clearly = -clear_margin > plays.layout.settings.mode_chance
-    better, chosen = (other, "one state") if clearly else (plays, "plays")
-    progress(f"the hysteresis is of {chosen}: plays have {clear_margin:.3g} nat more evidence")
-    return better
+    margin /= max(map(correlation_length, plays.residuals(plays.simulated(plays.theta))))
+    if margin < -plays.layout.settings.mode_chance:
+        progress(f"the hysteresis is of one state, by {-margin:.3g} nat")
+        return other
+    progress(f"the hysteresis is of plays; one state has {-margin:.3g} nat more evidence")
+    return plays
 
 
 def _margin(one: AxisFit, other: AxisFit) -> float:

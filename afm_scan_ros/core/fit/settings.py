@@ -132,7 +132,7 @@ class FitSettings:
     creep: float = setting(
         0.03,
         "1",
-        "greatest standard deviation of the bends of creep's gains, a third of that of a gain",
+        "greatest standard deviation of the second differences of creep's gains",
         "creep is 1 to 10 % a decade, of four time constants",
     )
     first_scale: float = setting(
@@ -360,19 +360,19 @@ class FitSettings:
     near_end: float = setting(
         0.01,
         "range of the drive",
-        "distance from an end of the drive at which it has been there",
+        "distance from an end of the drive at which that end counts as reached",
         "fifty samples a cycle miss the top of a sine by 0.2 %",
     )
     read_after: float = setting(
         5.0,
         "standard deviations",
-        "share of the drive's change that a displacement follows in its own sample, over zero",
+        "response in the sample of a step, from which on it is not noise",
         "by chance once in a million records",
     )
     rest_margin: float = setting(
         0.1,
         "range of the drive",
-        "distance at which 0 V, where scanners rest, belongs to the range of a model all the same",
+        "distance of 0 V from the drives up to which the model's range includes it",
         "an operator hardly changes over a tenth of its range",
     )
     fewest_blocks: int = setting(
@@ -384,7 +384,7 @@ class FitSettings:
     told: float = setting(
         0.5,
         "1",
-        "standard deviation of an effect's measure over that beforehand, where it is identified",
+        "standard deviation of an effect's measure, over that beforehand, if it is identified",
         "the records then tell more than what is expected of stages",
     )
     poor: float = setting(

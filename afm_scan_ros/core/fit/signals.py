@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
-from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.errors import InputError
@@ -113,8 +112,8 @@ def signals_of(
 def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:
     """Whether a displacement follows steps of its drive within their own sample.
 
-    Such a record was read after the drive's update. One that is read just before it shows nothing
-    of a step yet. Steps are what follows rest; they are to make most of the drive's way.
+    Such a displacement was read after the drive's update: just before it, nothing of a step shows
+    yet. A step follows a drive that rests. A record is judged where steps are most of its drive.
     """
     change, moved = np.diff(drive), np.diff(displacement)
     rests = np.concatenate([[True], change[:-1] == 0.0])
@@ -122,14 +121,10 @@ def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> boo
     if np.abs(change[steps]).sum() <= 0.5 * np.abs(change).sum():
         return False
     size = float(change[steps] @ change[steps])
-    seen, later = (float(change[steps] @ each) / size for each in _after(moved, steps))
+    following = np.append(moved[1:], 0.0)
+    seen, later = (float(change[steps] @ each[steps]) / size for each in (moved, following))
     noise = np.sqrt(2.0 / size) * noise_of(displacement)
     return bool(abs(seen) > max(settings.read_after * noise, 0.5 * abs(seen + later)))
-
-
-def _after(moved: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:
-    """What moves in the sample of a step, and in the one after."""
-    return moved[steps], np.append(moved, 0.0)[steps + 1]
 
 
 def in_step(drive: Array, displacement: Array, settings: FitSettings) -> Array:
@@ -157,10 +152,11 @@ def noise_of(signal: Array) -> float:
     return float(max(robust, float(np.finfo(np.float32).eps) * float(np.ptp(signal))))
 
 
-def correlated(residual: Array) -> float:
-    """Number of neighbouring samples (n,) that tell no more than one: the correlations' sum.
+def correlation_length(residual: Array) -> float:
+    """Samples of a residual (n,) that tell as much as one independent sample.
 
-    It ends where they first are noise's, below 2 / √n.
+    That is the integrated autocorrelation time, summed up to where the autocorrelation first falls
+    below that of noise, 2 / √n.
     """
     count = len(residual)
     spectrum = np.abs(rfft(residual - residual.mean(), 2 * count)) ** 2

@@ -8,13 +8,13 @@ Creep is identified too where its interval excludes none.
 """
 
 import numpy as np
-from attrs import frozen
-from scipy.linalg import cho_factor, cho_solve
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
-from afm_scan_ros.core.fit.signals import Signals, correlated
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.uncertainty import information, inverse
 from afm_scan_ros.core.model import (
     BaseEffects,
     EffectStatus,
@@ -43,31 +43,31 @@ class Knowledge:
 
     @classmethod
     def of(cls, fit: AxisFit) -> "Knowledge":
-        """Invert the normal equations of a fit; residuals that neighbours share count once."""
-        layout, lefts = fit.layout, fit.residuals(fit.simulated(fit.theta))
-        alike = np.average([correlated(one) for one in lefts], weights=[len(one) for one in lefts])
-        greatest = {name: getattr(layout.settings, name) for name in SEARCHED}
-        matrix, _ = fit.normal(with_operator=True)
-        own, wide = (layout.prior(scales, fit.theta)[0] for scales in (fit.scales, greatest))
-        told = matrix / alike
-        sums = (layout.conditioned(one) for one in (told + own, told + wide, wide))
-        return cls(fit, *map(_inverse, sums))
+        """Invert the precisions of a fit's parameters."""
+        greatest = {name: getattr(fit.layout.settings, name) for name in SEARCHED}
+        told = information(fit)
+        own, wide = (fit.layout.prior(scales, fit.theta)[0] for scales in (fit.scales, greatest))
+        posterior, widest, beforehand = (
+            inverse(fit, one) for one in (told + own, told + wide, wide)
+        )
+        return cls(fit, posterior, widest, beforehand)
 
     def tells(self, row: Array, expected: float | None = None) -> bool:
-        """Whether the records narrow a combination of θ, (size,), far enough.
+        """Whether the records narrow a combination of θ, (size,), to a share of what is expected.
 
-        It is ``expected`` within that standard deviation, or within the prior's.
+        What is ``expected`` is a standard deviation, the prior's where none is given.
         """
         after, before = (float(row @ each @ row) for each in (self.widest, self.beforehand))
         before = before if expected is None else expected**2
         return after < self.fit.layout.settings.told**2 * before
 
-    def interval(self, name: str, unit: str, value: float, row: Array) -> ParameterInterval:
-        """95 % interval of a combination of θ, (size,), that may not be negative."""
+    def interval(
+        self, name: str, unit: str, value: float, row: Array, least: float = -np.inf
+    ) -> ParameterInterval:
+        """95 % interval of a combination of θ, (size,), that is ``least`` at least."""
         half = CONFIDENT * float(np.sqrt(row @ self.posterior @ row))
-        return closed(name, (max(value - half, 0.0), value + half), unit)
+        return closed(name, (max(value - half, least), value + half), unit)
 
-    @property
     def of_scan(self) -> float:
         """Standard deviation of a predicted scan but for its mean, over its range (1).
 
@@ -91,7 +91,6 @@ class Knowledge:
         error = variance / len(moved) + fit.discrepancy**2 * np.var(moved)
         return float(np.sqrt(error) / np.ptp(moved))
 
-    @property
     def effects(self) -> BaseEffects:
         """How each effect is known, over which drive, frequencies and hold times."""
         return BaseEffects(_creep(self), _hysteresis(self), _vibration(self))
@@ -107,17 +106,18 @@ def _row(fit: AxisFit, part: str, values: Array | float) -> Array:
     return row
 
 
-def _unknown(kind: str) -> EffectStatus:
+def unknown(kind: str) -> EffectStatus:
+    """Status of an unknown effect, with the kind of record that would identify it."""
     return EffectStatus(Status.UNKNOWN, identifiable_from=kind)
 
 
 def _creep(known: Knowledge) -> EffectStatus:
     fit = known.fit
     row, settings = _row(fit, "creep", 1.0), fit.layout.settings
-    interval = known.interval("gain", "1", float(row @ fit.theta), row)
+    interval = known.interval("gain", "1", float(row @ fit.theta), row, 0.0)
     told = known.tells(row, settings.creep * settings.creep_per_decade)
     if not told and interval.lower == 0.0:
-        return _unknown("creep")
+        return unknown("creep")
     longest = max(len(one.drive) * one.period for one in fit.records)
     return EffectStatus(
         drive=_range(fit),
@@ -130,7 +130,7 @@ def _hysteresis(known: Knowledge) -> EffectStatus:
     fit = known.fit
     opening, row = _opening(fit)
     if not known.tells(row):
-        return _unknown("hysteresis")
+        return unknown("hysteresis")
     return EffectStatus(
         drive=_range(fit),
         frequencies=(0.0, max(swings(one.drive) / one.period for one in fit.records)),
@@ -157,16 +157,12 @@ def _vibration(known: Knowledge) -> EffectStatus:
     status = EffectStatus(drive=_range(fit), frequencies=(0.0, 0.5 / length))
     if modes := fit.layout.of_modes(fit.theta):
         peaks = [np.hypot(real, imag) / damping for _, damping, real, imag in modes]
-        return _with_intervals(status, _of_mode(known, int(np.argmax(peaks))))
+        return evolve(status, intervals=_of_mode(known, int(np.argmax(peaks))))
     row = _row(fit, "lags", fit.layout.lags)
-    shortest = min(one.period for one in fit.records)
-    if not known.tells(row) or row @ fit.theta < shortest:  # as samples are timed no better
-        return _unknown("frequency")
-    return _with_intervals(status, (known.interval("lag", "s", float(row @ fit.theta), row),))
-
-
-def _with_intervals(status: EffectStatus, intervals: tuple[ParameterInterval, ...]) -> EffectStatus:
-    return EffectStatus(drive=status.drive, frequencies=status.frequencies, intervals=intervals)
+    lag, shortest = float(row @ fit.theta), min(one.period for one in fit.records)
+    if not known.tells(row) or lag < shortest:  # as samples are timed no better
+        return unknown("frequency")
+    return evolve(status, intervals=(known.interval("lag", "s", lag, row, 0.0),))
 
 
 def _of_mode(known: Knowledge, which: int) -> tuple[ParameterInterval, ...]:
@@ -185,7 +181,3 @@ def swings(drive: Array) -> float:
     moves = np.diff(drive)
     ways = np.sign(moves[moves != 0.0])
     return float(np.count_nonzero(np.diff(ways)) / 2.0 / max(len(drive) - 1, 1))
-
-
-def _inverse(matrix: Array) -> Array:
-    return np.asarray(cho_solve(cho_factor(matrix), np.eye(len(matrix))))

@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
-from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.signals import Signals, correlation_length
 from afm_scan_ros.core.types import Array
 
 
@@ -29,11 +29,23 @@ class PredictedMotion:
     standard_deviation: Array
 
 
+def information(fit: AxisFit) -> Array:
+    """H of the normal equations, as if samples whose residuals are correlated were one sample."""
+    residuals = fit.residuals(fit.simulated(fit.theta))
+    lengths = [correlation_length(one) for one in residuals]
+    matrix, _ = fit.normal(with_operator=True)
+    return matrix / float(np.average(lengths, weights=[len(one) for one in residuals]))
+
+
 def covariance(fit: AxisFit) -> Array:
     """Covariance of θ, shape (size, size)."""
     precision, _ = fit.layout.prior(fit.scales, fit.theta)
-    matrix, _ = fit.normal(with_operator=True)
-    factor = cho_factor(fit.layout.conditioned(matrix + precision))
+    return inverse(fit, information(fit) + precision)
+
+
+def inverse(fit: AxisFit, matrix: Array) -> Array:
+    """Inverse of a precision of θ, shape (size, size)."""
+    factor = cho_factor(fit.layout.conditioned(matrix))
     return np.asarray(cho_solve(factor, np.eye(len(matrix))))
 
 

@@ -30,7 +30,7 @@ from afm_scan_ros.core.identification.vibration.rational_fit import (
     RationalFit,
     fit_rational,
 )
-from afm_scan_ros.core.model import EffectStatus, Range, Status, closed
+from afm_scan_ros.core.model import EffectStatus, Range, closed
 from afm_scan_ros.core.types import Array
 
 FINEST = 241
@@ -110,11 +110,6 @@ UNITS = {"gain": "1", "time_constant": "s"}
 def drive_range(drive: Array) -> Range:
     """Least and greatest drive, V, of a record (n,)."""
     return float(drive.min()), float(drive.max())
-
-
-def unknown(identifiable_from: str) -> EffectStatus:
-    """Status of an unknown effect, with the kind of record that would identify it."""
-    return EffectStatus(Status.UNKNOWN, identifiable_from=identifiable_from)
 
 
 def creep_status(fit: CreepFit, record: AxisRecord) -> EffectStatus:

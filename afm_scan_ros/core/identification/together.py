@@ -10,7 +10,7 @@ from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.signals import in_step, known_from, reads_after
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.alternating import AxisRecord
@@ -55,10 +55,7 @@ class FittedAxis:
 
 
 def identify_together(
-    records: Sequence[Record],
-    axis: str,
-    progress: ProgressCallback,
-    settings: FitSettings = DEFAULT_SETTINGS,
+    records: Sequence[Record], axis: str, progress: ProgressCallback
 ) -> FittedAxis:
     """Identify an axis from all its records but one that is to validate.
 
@@ -69,10 +66,10 @@ def identify_together(
     fitting = [one for one in records if one is not held_out]
     if not fitting:
         raise InputError("a validation record alone fits nothing: give more records")
-    fit = fit_axis(fitting, axis, settings, progress)
+    fit = fit_axis(fitting, axis, progress=progress)
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
-    model = evolve(model_of(fit), effects=told.effects)
+    model, deviation = evolve(model_of(fit), effects=told.effects()), told.of_scan()
     progress("validating")
     validation = None if held_out is None else error_of(model, held_out, axis)
     known = [] if validation is None else [validation.model_discrepancy]
@@ -84,12 +81,12 @@ def identify_together(
         model=model.also_known(known),
         operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
         discrepancy=fit.discrepancy,
-        deviation=told.of_scan,
+        deviation=deviation,
         left={r.name: float(np.std(each)) for r, each in zip(fit.records, left, strict=True)},
         warnings=(
             *_read_after(records, axis),
             *_of_fit(fit),
-            *_of_scan(told.of_scan, settings),
+            *_of_scan(deviation),
             *_of_validation(held_out, validation),
         ),
         validation=validation,
@@ -113,7 +110,7 @@ def _in_step(record: Record, axis: str) -> AxisRecord:
 
 
 def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
-    """Yield the records that were not."""
+    """Yield the records that were read after their drive's updates."""
     for one in records:
         if reads_after(*one.signals(axis), DEFAULT_SETTINGS):
             yield ReadAfterUpdate(one.name)
@@ -130,9 +127,9 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
         yield NotConverged(fit.remaining)
 
 
-def _of_scan(deviation: float, settings: FitSettings) -> Iterator[Finding]:
+def _of_scan(deviation: float) -> Iterator[Finding]:
     """Yield that the records do not tell what a scan is, where they do not."""
-    if deviation > settings.poor:
+    if deviation > DEFAULT_SETTINGS.poor:
         yield UncertainScan(deviation)
 
 

@@ -14,6 +14,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.sensitivity import simulate
+from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.fit.uncertainty import covariance, predicted
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
@@ -82,6 +83,20 @@ def test_a_discrepancy_of_a_small_part_of_the_noise_is_none() -> None:
     for share, expected in ((0.9 * lost, True), (1.1 * lost, False)):
         fit.discrepancy = alone * np.sqrt(share / (1.0 - share))
         assert fit.at_noise == expected
+
+
+def test_an_interval_holds_its_value_whatever_the_sign() -> None:
+    """The loop of a fit may go the other way by chance; gains of creep may not be negative."""
+    drive = levels(4, 6, 300)
+    noise = np.random.default_rng(5).normal(0.0, 1e-8, len(drive))
+    known = Knowledge.of(AxisFit(*of_plays_alone(drive, GAIN * drive + noise)))
+    row = np.eye(known.fit.layout.size)[0]
+    free = known.interval("opening", "V", -1.0, row)
+    bounded = known.interval("gain", "1", 1e-9, row, 0.0)
+    assert free.lower is not None
+    assert free.upper is not None
+    assert free.lower < -1.0 < free.upper
+    assert bounded.lower == 0.0
 
 
 def test_a_prediction_begins_at_rest_and_stays_within_the_records_drive() -> None:

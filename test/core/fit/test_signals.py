@@ -8,7 +8,7 @@ import afm_scan_ros as afm
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.signals import (
-    correlated,
+    correlation_length,
     in_step,
     known_from,
     longest_block,
@@ -45,7 +45,7 @@ def test_neighbours_count_once_as_far_as_they_are_alike(kept: float) -> None:
     """Of an autoregression of order one the correlations are a geometric series."""
     noise = np.random.default_rng(3).standard_normal(100_000)
     alike = signal.lfilter([1.0], [1.0, -kept], noise)
-    assert correlated(alike) == pytest.approx((1.0 + kept) / (1.0 - kept), rel=0.1)
+    assert correlation_length(alike) == pytest.approx((1.0 + kept) / (1.0 - kept), rel=0.1)
 
 
 @pytest.mark.parametrize("late", [0, 1])
