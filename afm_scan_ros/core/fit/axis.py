@@ -102,8 +102,9 @@ def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit by plays, the paper's operator, or by one state where that is clearly better.
 
     Where plays leave nothing but the sensor's noise, no other operator can be seen to do better.
-    The evidence is that of independent residuals, so it is divided by their correlation length, and
-    one state has to be as clear as a mode. One state that diverges is none of the scanner's.
+    The evidence is that of independent residuals, so the lead of one state is divided by their
+    correlation length, and has to be as clear as a mode's. One state that diverges is none of the
+    scanner's.
     """
     if plays.at_noise:
         progress("plays leave nothing but noise")
@@ -111,16 +112,16 @@ def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     progress("fitting the hysteresis by one state")
     try:
         other = with_one_state(plays)
-        margin = _margin(plays, other)
+        lead = -_margin(plays, other)
+        if lead > 0.0:
+            settle(other, other.layout.settings.most_steps, searching=True)
+            lead = other.evidence() - plays.evidence()
     except ScanError as error:
         progress(f"one state: {error}")
         return plays
-    margin /= max(map(correlation_length, plays.residuals(plays.simulated(plays.theta))))
-    if margin < -plays.layout.settings.mode_chance:
-        progress(f"the hysteresis is of one state, by {-margin:.3g} nat")
-        return other
-    progress(f"the hysteresis is of plays; one state has {-margin:.3g} nat more evidence")
-    return plays
+    lead /= max(map(correlation_length, other.residuals(other.simulated(other.theta))))
+    progress(f"one state has {lead:.3g} nat more evidence than plays")
+    return other if lead > other.layout.settings.mode_chance else plays
 
 
 def _margin(one: AxisFit, other: AxisFit) -> float:
