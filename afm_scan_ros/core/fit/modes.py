@@ -130,33 +130,59 @@ def _about(
     """
     if not 0.0 < damping < 1.0:
         return None
-    pole = omega * (-damping + 1j * np.sqrt(1.0 - damping**2))
-    matrix, right, lines, misfit = np.zeros((4, 4)), np.zeros(4), 0.0, 0.0
-    edges = omega * (1.0 + settings.mode_band * np.array([-1.0, 1.0]))
-    for one in spectra:
-        band = slice(*np.searchsorted(one.omega, edges))
-        left, driven, at = one.left[band], one.driven[band], one.omega[band]
-        power = np.abs(left) ** 2
-        if len(at) < 4 or at[-1] < omega or not power.any() or not driven.any():  # noqa: PLR2004 - as many weights
-            continue
-        z, turned = np.exp(pole * one.period), np.exp(1j * at * one.period)
-        rising, falling = (1.0 - z) / (turned - z), (1.0 - z.conj()) / (turned - z.conj())
-        shapes = (np.ones(len(at)), 1j * at / omega, rising + falling, 1j * (rising - falling))
-        columns = np.array([1.0, 1.0, 0.5, 0.5])[:, np.newaxis] * np.array(shapes) * driven
-        count = power.sum() ** 2 / (power**2).sum()
-        matrix += count / power.sum() * (columns.conj() @ columns.T).real
-        right += count / power.sum() * (columns.conj() @ left).real
-        lines += count
-        misfit += power.sum() / one.variance
-    if lines == 0.0:
+    bands = [one for each in spectra if (one := _band(each, omega, damping, settings)) is not None]
+    if not bands:
         return None
-    matrix += np.finfo(float).eps * np.trace(matrix) * np.eye(4)
-    smooth = lines - right[:2] @ np.linalg.solve(matrix[:2, :2], right[:2])
-    shift, _, real, imag = weights = np.linalg.solve(matrix, right)
-    share = 1.0 - max(float((lines - right @ weights) / smooth), float(np.finfo(float).eps))
+    matrix, right = sum(one.matrix for one in bands), sum(one.right for one in bands)
+    matrix = matrix + np.finfo(float).eps * np.trace(matrix) * np.eye(4)
+    weights = np.linalg.solve(matrix, right)
+    smooth = np.append(np.linalg.solve(matrix[:2, :2], right[:2]), [0.0, 0.0])
+    least = np.finfo(float).eps
+    before, after = (
+        np.array([max(one.left_by(each), least * one.lines) for one in bands])
+        for each in (smooth, weights)
+    )
+    lines, misfits = (np.array([getattr(one, name) for one in bands]) for name in ("lines", "misfit"))
+    share = 1.0 - float(misfits @ (after / lines)) / float(misfits @ (before / lines))
+    chance = float(lines @ np.log(before / after))
+    shift, _, real, imag = weights
     gain = float(1.0 + shift + real)
     mode = omega, damping, float(real) / gain, float(imag) / gain
-    return FoundMode(mode, -lines * float(np.log1p(-share)), share, misfit, gain)
+    return FoundMode(mode, chance, share, float(misfits.sum()), gain)
+
+
+class _Band(NamedTuple):
+    """Normal equations of a record about a frequency, over the mean power of its ``lines`` there.
+
+    ``misfit`` (nat) is how much its residuals there are of all.
+    """
+
+    matrix: NDArray[np.float64]
+    right: NDArray[np.float64]
+    lines: float
+    misfit: float
+
+    def left_by(self, weights: Array) -> float:
+        """Power that weights (4,) leave, in lines."""
+        return float(self.lines - 2.0 * weights @ self.right + weights @ self.matrix @ weights)
+
+
+def _band(one: _Spectrum, omega: float, damping: float, settings: FitSettings) -> _Band | None:
+    """Weigh a smooth response and a mode within a band; None where a record has too few lines."""
+    edges = omega * (1.0 + settings.mode_band * np.array([-1.0, 1.0]))
+    band = slice(*np.searchsorted(one.omega, edges))
+    left, driven, at = one.left[band], one.driven[band], one.omega[band]
+    power = np.abs(left) ** 2
+    if len(at) < 4 or at[-1] < omega or not power.any() or not driven.any():  # noqa: PLR2004 - as many weights
+        return None
+    pole = omega * (-damping + 1j * np.sqrt(1.0 - damping**2))
+    z, turned = np.exp(pole * one.period), np.exp(1j * at * one.period)
+    rising, falling = (1.0 - z) / (turned - z), (1.0 - z.conj()) / (turned - z.conj())
+    shapes = (np.ones(len(at)), 1j * at / omega, rising + falling, 1j * (rising - falling))
+    columns = np.array([1.0, 1.0, 0.5, 0.5])[:, np.newaxis] * np.array(shapes) * driven
+    lines, total = power.sum() ** 2 / (power**2).sum(), power.sum()
+    matrix, right = (columns.conj() @ columns.T).real, (columns.conj() @ left).real
+    return _Band(lines / total * matrix, lines / total * right, lines, total / one.variance)
 
 
 def _refined(

@@ -8,6 +8,7 @@ from scipy import signal
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import best_mode, clear, large
+from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     CREEP,
     DAMPING,
@@ -23,14 +24,19 @@ from helpers.fit_cases import (
 )
 
 
-def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
-    """A straight line through them has another, as the phase turns."""
+def waves() -> Array:
+    """Two periods of a multisine about the resonance."""
     rng = np.random.default_rng(8)
     lines = np.arange(400, 900)
     spectrum = np.zeros(10_001, complex)
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     wave = np.tile(np.fft.irfft(spectrum, 20_000), 2)
-    drive = np.concatenate([[0.0], wave / np.abs(wave).max(), [0.0]])
+    return np.concatenate([[0.0], wave / np.abs(wave).max(), [0.0]])
+
+
+def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
+    """A straight line through them has another, as the phase turns."""
+    drive = waves()
     moved = displaced(lambda volts: volts, drive)
     layout, given, _, theta = of_plays_alone(drive, moved)
     line = float(drive @ moved / (drive @ drive))
@@ -40,6 +46,21 @@ def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
     assert found is not None
     assert abs(line / GAIN - 1.0) > 0.5
     assert line * found.gain == pytest.approx(GAIN * (1.0 + CREEP[0]), rel=0.15)
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+
+
+def test_a_mode_is_seen_beside_a_record_of_noise() -> None:
+    """Noise has many lines, but none of the residuals about the resonance."""
+    driven, slow = waves(), levels(3, 10, 40_000)
+    layout, given, gain, theta = of_plays_alone(driven, displaced(lambda volts: volts, driven))
+    noise = 1e-7 * np.random.default_rng(9).standard_normal(len(slow))
+    moved = displaced(lambda volts: volts, slow) + noise
+    given += of_plays_alone(slow, moved)[1]
+    fit = AxisFit(layout, given, gain, theta)
+    fit.weigh()
+    found = best_mode(fit, large)
+    assert found is not None
+    assert found.share > SETTINGS.dominant_share
     assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
 
 
