@@ -29,11 +29,13 @@ class _RecordGain:
     """Gain of a record over the model's, and how wide its loops open, 1/m of its motion.
 
     Loops open by more the farther the drive goes (Rayleigh); those that lag are positive. ``half``
-    is the half-width of their 95 % interval, infinite where the drive mostly rests.
+    is the half-width of their 95 % interval, infinite where the drive mostly rests. ``swing`` (V)
+    is how far the drive goes.
     """
 
     name: str
     gain: float
+    swing: float
     loops: float
     half: float
 
@@ -52,7 +54,7 @@ def refuse_unlike(fit: AxisFit) -> None:
     found = [_shown(record, line[record.used], highest, settings) for record, line in pairs]
     shown = [one for one in found if one is not None]
     if len(shown) > 1:
-        _refuse_gains(shown, fit.gain, settings.like_gains)
+        _refuse_gains(shown, fit.gain, settings)
         _refuse_backward(shown, settings.like_gains)
 
 
@@ -76,7 +78,8 @@ def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> 
     gain = float(along @ moved / (along @ along))
     rests = np.median(np.abs(np.diff(record.drive))) == 0.0
     half = np.inf if rests else _half_width(columns, moved - columns @ found, settings) / abs(gain)
-    return _RecordGain(record.name, gain, float(found[2] / gain), half)
+    swing = float(np.ptp(record.drive))
+    return _RecordGain(record.name, gain, swing, float(found[2] / gain), half)
 
 
 def _half_width(columns: Array, residual: Array, settings: FitSettings) -> float:
@@ -95,14 +98,19 @@ def _half_width(columns: Array, residual: Array, settings: FitSettings) -> float
     return float(student.ppf(0.975, count - 1) * np.sqrt(spread * (count - 1) / count))
 
 
-def _refuse_gains(shown: Sequence[_RecordGain], scale: float, most: float) -> None:
-    """Refuse the record whose gain differs most, where that is by a factor of ``most``."""
+def _refuse_gains(shown: Sequence[_RecordGain], scale: float, settings: FitSettings) -> None:
+    """Refuse the record whose gain differs most, where that is by more than a scanner's does.
+
+    The gain of one scanner may grow with the swing of its drive, by ``swing_gains``.
+    """
     usual = float(np.exp(np.median(np.log([abs(one.gain) for one in shown]))))
     backward = sorted(shown, key=lambda one: one.loops)
     worst = max(backward, key=lambda one: round(abs(np.log(abs(one.gain) / usual)), DIGITS))
     others = [one for one in shown if one is not worst]
-    beside = float(np.median([one.gain for one in others]))
-    if 1.0 / most <= worst.gain / beside <= most:
+    beside, most = float(np.median([one.gain for one in others])), settings.like_gains
+    farther = worst.swing > float(np.median([one.swing for one in others]))
+    grown = settings.swing_gains ** (1.0 if farther else -1.0)
+    if min(grown, 1.0) / most <= worst.gain / beside <= max(grown, 1.0) * most:
         return
     ratio = worst.gain * beside * (scale / UNITS) ** 2
     exchanged = np.any((ratio > 1.0 / most) & (ratio < most))

@@ -397,7 +397,13 @@ class FitSettings:
         2.0,
         "1",
         "greatest factor between the gains that records of one scanner show",
-        "hysteresis and creep change a gain by less",
+        "creep and the place of small loops in the range change a gain by less",
+    )
+    swing_gains: float = setting(
+        2.0,
+        "1",
+        "further factor by which the gain may grow with the swing of the drive",
+        "ceramics move up to three times as far a volt in a strong field as in a weak one",
     )
     slow_share: float = setting(
         0.5,

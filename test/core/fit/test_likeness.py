@@ -57,3 +57,12 @@ def test_a_record_of_another_unit_is_named() -> None:
     given[1] = evolve(given[1], displacement=1e3 * given[1].displacement)
     with pytest.raises(InputError, match=r"^50 V: it moves .* unit"):
         check(given)
+
+
+def test_the_gain_of_one_scanner_may_grow_with_its_swing_and_not_fall() -> None:
+    """Of ceramics, that of a strong field is up to three times that of a weak one."""
+    given = records(0.3e-6)
+    shrunk = evolve(given[0], displacement=given[0].displacement / 3.0)
+    check([shrunk, *given[1:]])
+    with pytest.raises(InputError, match=r"^95 V: it moves"):
+        check([*given[:2], evolve(given[2], displacement=given[2].displacement / 3.0)])
