@@ -101,13 +101,13 @@ def _fit_plays(fit: AxisFit) -> None:
 def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit by plays, the paper's operator, or by one state where that is clearly better.
 
-    Where plays leave nothing but the sensor's noise, no other operator can be seen to do better.
+    Where plays leave hardly more than the sensor's noise, no other operator is tried.
     The evidence is that of independent residuals, so the lead of one state is divided by their
     correlation length, and has to be as clear as a mode's. One state that diverges is none of the
     scanner's.
     """
-    if plays.at_noise:
-        progress("plays leave nothing but noise")
+    if plays.sufficient:
+        progress("plays leave hardly more than noise")
         return plays
     progress("fitting the hysteresis by one state")
     try:

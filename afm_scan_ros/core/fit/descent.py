@@ -132,14 +132,17 @@ class _Equations:
 
 
 def _descend(fit: AxisFit, equations: _Equations) -> float:
-    """Try ever shorter steps until one descends; return how far."""
+    """Try ever shorter steps until one descends; return how far.
+
+    While the objective is as quadratic as steps take it to be, the first is tried without a bend.
+    """
     settings, start = fit.layout.settings, fit.theta
     lowest, before = fit.layout.lowest() - start, fit.objective(start)
     fit.remaining = equations.foreseen(equations.move(0.0, equations.right, lowest))
-    fit.quadratic, worse = False, 2.0
+    straight, fit.quadratic, worse = fit.quadratic, False, 2.0
     for _ in range(settings.most_trials):
         move = equations.move(fit.damping, equations.right, lowest)
-        theta = start + _bent(fit, equations, move, lowest)
+        theta = start + (move if straight else _bent(fit, equations, move, lowest))
         fell = before - fit.objective(theta)
         if fell > 0.0:
             foreseen = max(equations.foreseen(move), np.finfo(float).tiny)
@@ -148,6 +151,7 @@ def _descend(fit: AxisFit, equations: _Equations) -> float:
             fit.damping = max(better * fit.damping, settings.least_damping)
             fit.theta, fit.quadratic = theta, fell > 0.5 * fit.remaining
             return fell
+        straight = False
         fit.damping, worse = worse * fit.damping, 2.0 * worse
     return 0.0
 

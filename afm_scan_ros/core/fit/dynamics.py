@@ -78,13 +78,15 @@ class PoleBank:
 class Response:
     """Means over blocks of y, shape (blocks,), and of what its derivatives are made of.
 
-    ``states`` x_i and ``changes`` ∂x_i/∂p_i, shape (blocks, poles), are before the creep; ``late``
-    (blocks, time constants) is what each creep element makes of V's output.
+    ``modes`` x_i and ``changes`` ∂x_i/∂p_i, shape (blocks, modes), and ``lags`` x_i (blocks, lags)
+    are before the creep; ``late`` (blocks, time constants) is what each creep element makes of V's
+    output.
     """
 
     output: Array
-    states: Complex
+    modes: Complex
     changes: Complex
+    lags: Array
     late: Array
 
 
@@ -92,51 +94,64 @@ def respond(
     dynamics: PoleBank, period: float, inputs: Array, block: int, settled: float
 ) -> Response:
     """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
-    z = np.exp(dynamics.poles * period)
+    z, count = np.exp(dynamics.poles * period), dynamics.modes
     slow = np.exp(-period / dynamics.time_constants)
-    result = _respond(z, dynamics.weights, period, slow, dynamics.gains, inputs, block, settled)
-    return Response(*result)
+    modes = z[:count], dynamics.weights[:count]
+    lags = z[count:].real.copy(), dynamics.weights[count:].real.copy()
+    creep = slow, dynamics.gains
+    return Response(*_respond(*modes, *lags, *creep, period, inputs, block, settled))
 
 
 @compiled
 def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not objects
     z: Complex,
     weights: Complex,
-    period: float,
+    fast: Array,
+    shares: Array,
     slow: Array,
     gains: Array,
+    period: float,
     inputs: Array,
     block: int,
     settled: float,
-) -> tuple[Array, Complex, Complex, Array]:
-    blocks, n, m = inputs.size // block, z.size, slow.size
-    output, late = np.zeros(blocks), np.zeros((blocks, m))
-    states, changes = np.zeros((blocks, n), np.complex128), np.zeros((blocks, n), np.complex128)
-    x, d = np.full(n, settled + 0j), np.zeros(n, np.complex128)
-    c = np.full(m, settled * weights.real.sum())
-    share = 1.0 / block
+) -> tuple[Array, Complex, Complex, Array, Array]:
+    blocks = inputs.size // block
+    output, lags, late = (
+        np.zeros(blocks),
+        np.zeros((blocks, fast.size)),
+        np.zeros((blocks, slow.size)),
+    )
+    modes = np.zeros((blocks, z.size), np.complex128)
+    changes = np.zeros((blocks, z.size), np.complex128)
+    x, d = np.full(z.size, settled + 0j), np.zeros(z.size, np.complex128)
+    lag, c = np.full(fast.size, settled), np.full(slow.size, settled)
+    c *= weights.real.sum() + shares.sum()
     for b in range(blocks):
         for k in range(b * block, (b + 1) * block):
             v, y = inputs[k], 0.0
-            for i in range(n):
+            for i in range(z.size):
                 y += weights[i].real * x[i].real - weights[i].imag * x[i].imag
-                states[b, i] += x[i]
+                modes[b, i] += x[i]
                 changes[b, i] += d[i]
                 d[i] = z[i] * (d[i] + period * (x[i] - v))
                 x[i] = v + z[i] * (x[i] - v)
+            for i in range(fast.size):
+                y += shares[i] * lag[i]
+                lags[b, i] += lag[i]
+                lag[i] = v + fast[i] * (lag[i] - v)
             total = y
-            for j in range(m):
+            for j in range(slow.size):
                 total += gains[j] * c[j]
                 late[b, j] += c[j]
                 c[j] = y + slow[j] * (c[j] - y)
             output[b] += total
-        output[b] *= share
-        for i in range(n):
-            states[b, i] *= share
-            changes[b, i] *= share
-        for j in range(m):
-            late[b, j] *= share
-    return output, states, changes, late
+    share = 1.0 / block
+    output *= share
+    modes *= share
+    changes *= share
+    lags *= share
+    late *= share
+    return output, modes, changes, lags, late
 
 
 def pulled_inputs(
@@ -178,7 +193,8 @@ class HeldFilter:
         block: int,
         settled: Array,
     ) -> None:
-        order = np.argsort(bank[0].imag == 0.0, kind="stable")
+        some = np.flatnonzero(bank[1])
+        order = some[np.argsort(bank[0][some].imag == 0.0, kind="stable")]
         poles, weights = (each[order] for each in bank)
         self._modes = int(np.count_nonzero(poles.imag))
         self._z = np.exp(poles * length)

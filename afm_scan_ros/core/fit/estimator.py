@@ -11,9 +11,10 @@ does not: so a step is approximate, and what it leads to is exact.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
-from attrs import define, evolve, field
+from attrs import define, evolve, field, frozen
 from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -24,6 +25,30 @@ from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, pulled, simu
 from afm_scan_ros.core.fit.signals import Signals, noise_of
 from afm_scan_ros.core.fit.tones import find_tones, offered_tones
 from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class _Free:
+    """What is free in one record, as linear regressors with their prior, and their products."""
+
+    columns: Array
+    products: Array
+    variance: float
+
+    @cached_property
+    def matrix(self) -> Array:
+        """H of the regressors, of which all but the offset have a prior of unit variance."""
+        prior = np.diag([0.0, *np.ones(len(self.products) - 1)])
+        return np.asarray(self.products / self.variance + prior)
+
+    def weights(self, signal: Array) -> Array:
+        """Weights of the regressors that explain a signal best."""
+        right = self.columns.T @ signal / self.variance
+        return np.asarray(np.linalg.solve(self.matrix, right))
+
+    def without(self, signal: Array) -> Array:
+        """Return a signal without what the regressors explain of it."""
+        return np.asarray(signal - self.columns @ self.weights(signal))
 
 
 @define(eq=False)
@@ -47,6 +72,9 @@ class AxisFit:
     grows: bool = False
     damping: float = field()
     _columns: dict[int, list[Columns]] = field(factory=dict)
+    _regressors: dict[int, tuple[tuple[tuple[float, ...], int], Array, Array, Array]] = field(
+        factory=dict
+    )
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
@@ -63,11 +91,12 @@ class AxisFit:
         return self.remaining < self.layout.settings.converged * self.layout.size
 
     @property
-    def at_noise(self) -> bool:
-        """Whether the discrepancy is a small part of what each record varies by."""
+    def sufficient(self) -> bool:
+        """Whether the discrepancy is slight, or a small part of what each record varies by."""
         each = [(one, self.variance(one)) for one in self.records]
         shares = [(self.discrepancy * one.motion) ** 2 / whole for one, whole in each]
-        return max(shares) < self.layout.settings.lost
+        settings = self.layout.settings
+        return max(shares) < settings.lost or self.discrepancy < settings.slight
 
     def variance(self, record: Signals) -> float:
         """Variance v_k of the mean of a block, m²."""
@@ -82,9 +111,9 @@ class AxisFit:
 
     def _without(self, simulations: Sequence[Simulation]) -> Iterator[tuple[Array, Array]]:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
-        for record, simulation in zip(self.records, simulations, strict=True):
+        for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             left = record.mean - self.gain * simulation.response.output[record.used]
-            yield left, _Free(record, self.layout, self.variance(record)).without(left)
+            yield left, self._free(k).without(left)
 
     def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
@@ -134,8 +163,8 @@ class AxisFit:
         lefts = self.residuals(simulations)
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             pieces = self._pieces_of(k) if with_operator else None
-            variance, size = self.variance(record), self.layout.size
-            free, lost = _Free(record, self.layout, variance), lefts[k] / variance
+            variance, size, free = self.variance(record), self.layout.size, self._free(k)
+            lost = lefts[k] / variance
             products, share = np.zeros((size, size)), np.zeros((free.columns.shape[1], size))
             for rows, one in jacobian(self.layout, self.theta, record, simulation, pieces):
                 live = np.flatnonzero(one.any(axis=0))
@@ -160,7 +189,7 @@ class AxisFit:
                 up, down, middle = (one.response.output[record.used] for one in three)
                 variance = self.variance(record)
                 added = self.gain * (2.0 * middle - up - down) / part**2
-                left = _Free(record, self.layout, variance).without(added)
+                left = self._free(k).without(added)
                 pieces = self._pieces_of(k) if with_operator else None
                 pull = self.gain * left / variance
                 right += pulled(self.layout, self.theta, record, here[k], pieces, pull)
@@ -234,8 +263,8 @@ class AxisFit:
         """Frequency (Hz) and amplitude (m), in the middle of the record, of each record's tones."""
         found = []
         lefts = self._without(self.simulated(self.theta))
-        for record, (left, _) in zip(self.records, lefts, strict=True):
-            free = _Free(record, self.layout, self.variance(record))
+        for k, (record, (left, _)) in enumerate(zip(self.records, lefts, strict=True)):
+            free = self._free(k)
             weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
             sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
             found.append(tuple(zip(record.tones, map(float, sizes), strict=True)))
@@ -250,6 +279,15 @@ class AxisFit:
         operator = self.theta[: self.layout.parts["map"].stop]
         self.layout, self.theta = layout, layout.start()
         self.theta[: len(operator)] = operator
+
+    def _free(self, k: int) -> _Free:
+        """What is free in a record; its regressors are kept while they stay the same."""
+        record, slow = self.records[k], self.layout.time_constants
+        key = record.tones, id(slow)
+        if k not in self._regressors or self._regressors[k][0] != key:
+            columns = record.regressors(slow, self.layout.settings.creep)
+            self._regressors[k] = key, slow, columns, columns.T @ columns
+        return _Free(*self._regressors[k][2:], self.variance(record))
 
     def _pieces_of(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept."""
@@ -269,22 +307,3 @@ def _finite(values: Array) -> Array:
     if not np.isfinite(values).all():
         raise ScanError("the fit diverged: its operator's response grows without bound")
     return values
-
-
-class _Free:
-    """What is free in one record, as linear regressors with their prior."""
-
-    def __init__(self, record: Signals, layout: Layout, variance: float) -> None:
-        self.columns = record.regressors(layout.time_constants, layout.settings.creep)
-        self._variance = variance
-        prior = np.diag([0.0, *np.ones(self.columns.shape[1] - 1)])
-        self.matrix = self.columns.T @ self.columns / variance + prior
-
-    def weights(self, signal: Array) -> Array:
-        """Weights of the regressors that explain a signal best."""
-        right = self.columns.T @ signal / self._variance
-        return np.asarray(np.linalg.solve(self.matrix, right))
-
-    def without(self, signal: Array) -> Array:
-        """Return a signal without what the regressors explain of it."""
-        return np.asarray(signal - self.columns @ self.weights(signal))

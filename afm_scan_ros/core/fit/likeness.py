@@ -55,7 +55,7 @@ def refuse_unlike(fit: AxisFit) -> None:
     shown = [one for one in found if one is not None]
     if len(shown) > 1:
         _refuse_gains(shown, fit.gain, settings)
-        _refuse_backward(shown, settings.like_gains)
+        _refuse_backward(shown, fit.gain, settings.like_gains)
 
 
 def _shown(record: Signals, line: Array, mode: float, settings: FitSettings) -> _RecordGain | None:
@@ -112,11 +112,9 @@ def _refuse_gains(shown: Sequence[_RecordGain], scale: float, settings: FitSetti
     grown = settings.swing_gains ** (1.0 if farther else -1.0)
     if min(grown, 1.0) / most <= worst.gain / beside <= max(grown, 1.0) * most:
         return
-    ratio = worst.gain * beside * (scale / UNITS) ** 2
-    exchanged = np.any((ratio > 1.0 / most) & (ratio < most))
     why = (
         "its drive and displacement columns are exchanged; name them the other way round"
-        if exchanged
+        if _may_be_exchanged(worst.gain, beside, scale, settings.like_gains)
         else "it is of another axis, scanner, unit or amplifier; leave it out, or give its units"
     )
     reference = others[0].name if len(others) == 1 else "the other records"
@@ -126,12 +124,24 @@ def _refuse_gains(shown: Sequence[_RecordGain], scale: float, settings: FitSetti
     )
 
 
-def _refuse_backward(shown: Sequence[_RecordGain], most: float) -> None:
-    """Refuse a record whose loops go the other way, with 95 % confidence, about as wide."""
+def _may_be_exchanged(gain: float, beside: float, scale: float, most: float) -> bool:
+    """Whether a gain is the inverse of those beside it, in the unit of some column."""
+    ratio = gain * beside * (scale / UNITS) ** 2
+    return bool(np.any((ratio > 1.0 / most) & (ratio < most)))
+
+
+def _refuse_backward(shown: Sequence[_RecordGain], scale: float, most: float) -> None:
+    """Refuse a record whose loops go the other way, with 95 % confidence, about as wide.
+
+    Its gain is the inverse of the others', or else its columns are not exchanged.
+    """
     looping = [one for one in shown if np.isfinite(one.half)]
     for one in looping:
-        least = min((each.loops - each.half for each in looping if each is not one), default=0.0)
-        if one.loops + one.half < 0.0 < least and -one.loops > least / most:
+        others = [each for each in looping if each is not one]
+        least = min((each.loops - each.half for each in others), default=0.0)
+        beside = float(np.median([each.gain for each in others])) if others else 0.0
+        inverse = _may_be_exchanged(one.gain, beside, scale, most)
+        if inverse and one.loops + one.half < 0.0 < least and -one.loops > least / most:
             raise InputError(
                 f"{one.name}: its displacement runs ahead of its drive, as wide as those of the"
                 " other records lag: its two columns are exchanged; name them the other way round"

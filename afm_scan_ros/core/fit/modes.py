@@ -142,7 +142,7 @@ def _about(
         np.array([max(one.left_by(each), least * one.lines) for one in bands])
         for each in (smooth, weights)
     )
-    lines, misfits = (np.array([getattr(one, name) for one in bands]) for name in ("lines", "misfit"))
+    lines, misfits = np.array([(one.lines, one.misfit) for one in bands]).T
     share = 1.0 - float(misfits @ (after / lines)) / float(misfits @ (before / lines))
     chance = float(lines @ np.log(before / after))
     shift, _, real, imag = weights

@@ -141,10 +141,10 @@ def _at_rest(layout: Layout, theta: Array) -> Array:
 def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
     """Derivatives by the weights of the lags, and by what θ holds of each mode."""
     dynamics, response = simulation.dynamics, simulation.response
-    lags = response.states[:, dynamics.modes :].real
-    columns, settled = [lags], [np.full(lags.shape[1], simulation.settled)]
+    columns = [response.lags]
+    settled = [np.full(response.lags.shape[1], simulation.settled)]
     for i, (omega, damping, *_) in enumerate(layout.of_modes(theta)):
-        state, change = response.states[:, i], dynamics.weights[i] * response.changes[:, i]
+        state, change = response.modes[:, i], dynamics.weights[i] * response.changes[:, i]
         pole = dynamics.poles[i]
         turned = omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
         moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]

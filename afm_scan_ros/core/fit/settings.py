@@ -237,6 +237,12 @@ class FitSettings:
         "modes at most",
         "each costs a fit, and stages show one to three",
     )
+    slight: float = setting(
+        5e-4,
+        "1",
+        "discrepancy of plays below which no other operator is tried",
+        "half the least that plays leave of scanners of one state made for tests",
+    )
     decided: float = setting(
         10.0,
         "1",

@@ -82,7 +82,7 @@ def test_a_discrepancy_of_a_small_part_of_the_noise_is_none() -> None:
     lost, alone = SETTINGS.lost, one.noise / np.sqrt(one.block) / one.motion
     for share, expected in ((0.9 * lost, True), (1.1 * lost, False)):
         fit.discrepancy = alone * np.sqrt(share / (1.0 - share))
-        assert fit.at_noise == expected
+        assert fit.sufficient == expected
 
 
 def test_an_interval_holds_its_value_whatever_the_sign() -> None:

@@ -14,6 +14,7 @@ congruent.
 import numpy as np
 from attrs import field, frozen
 
+from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.base import LEVELS, CausalInverse, StatelessEffect, solved
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, rounded_into
 from afm_scan_ros.core.effects.hysteresis.walk import BASE, INPUT, OUTPUT, looked_up, walk_copy
@@ -23,10 +24,11 @@ from afm_scan_ros.core.types import Array, floats
 
 def terms(outputs: Array, lower: float, upper: float, count: int) -> Array:
     """What each coefficient is multiplied by at outputs F (V) of shape (n,): shape (n, count)."""
-    z = (2.0 * (outputs - lower) / (upper - lower) - 1.0)[:, np.newaxis]
-    inside, powers = np.clip(z, -1.0, 1.0), np.arange(count)
-    slope = (powers + 2) * inside ** (powers + 1) - powers % 2
-    return np.asarray(inside ** (powers + 2) - inside ** (powers % 2) + slope * (z - inside))
+    z = 2.0 * (outputs - lower) / (upper - lower) - 1.0
+    inside, order = np.clip(z, -1.0, 1.0), np.arange(count)
+    powers = np.polynomial.polynomial.polyvander(inside, count + 1)
+    slope = (order + 2) * powers[:, 1:-1] - order % 2
+    return np.asarray(powers[:, 2:] - powers[:, order % 2] + slope * (z - inside)[:, np.newaxis])
 
 
 @frozen
@@ -71,16 +73,11 @@ class OutputMap(StatelessEffect):
 
     def _bend(self, outputs: Array) -> tuple[Array, Array]:
         """A at outputs F (V), and dA/dF."""
-        half = 0.5 * (self.upper - self.lower)
-        z = np.clip((outputs - self.lower) / half - 1.0, -1.0, 1.0)
         powers = np.zeros(len(self.coefficients) + 2)
         for j, coefficient in enumerate(self.coefficients):
             powers[j + 2] += coefficient
             powers[j % 2] -= coefficient
-        curve = np.polynomial.Polynomial(powers)
-        tilt = curve.deriv()(z) / half
-        straight = outputs - (self.lower + half * (z + 1.0))
-        return outputs + curve(z) + tilt * straight, 1.0 + tilt
+        return _bent(outputs, self.lower, 0.5 * (self.upper - self.lower), powers)
 
     def input(self, outputs: Array) -> Array:
         """Operator's outputs A (V) for effective inputs F (V), both (n,)."""
@@ -93,6 +90,23 @@ class OutputMap(StatelessEffect):
     def output(self, inputs: Array) -> Array:
         """Effective inputs F (V) for the operator's outputs A (V), both (n,)."""
         return solved(self._bend, self._levels, self._bent, inputs)
+
+
+@compiled
+def _bent(outputs: Array, lower: float, half: float, powers: Array) -> tuple[Array, Array]:
+    """F + p(z) and its slope, p being straight beyond -1 and 1."""
+    bent, slope = np.empty(outputs.size), np.empty(outputs.size)
+    for k in range(outputs.size):
+        beyond = (outputs[k] - lower) / half - 1.0
+        z = min(max(beyond, -1.0), 1.0)
+        value, tilt = 0.0, 0.0
+        for power in powers[::-1]:
+            tilt = tilt * z + value
+            value = value * z + power
+        tilt /= half
+        bent[k] = outputs[k] + value + tilt * half * (beyond - z)
+        slope[k] = 1.0 + tilt
+    return bent, slope
 
 
 DEPOLARISING_CYCLES = 200
