@@ -12,6 +12,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.identification.agreement import (
     cross_findings,
     loops_after,
@@ -121,9 +122,10 @@ def identify_records(
     """Identify each axis from whatever records of it there are, of any number and kinds.
 
     With one each of creep, frequency response and reversal curves an axis is identified as by
-    ``identify_axis``; all further records are then held out and give the model's error. Otherwise
-    all are fitted together, and what they do not identify is unknown in the model. Raises
-    InputError where a record cannot show what it is for, ScanError where a fit does not converge.
+    ``identify_axis``, where that leaves hardly anything of any record; further records are then
+    held out and give the model's error. Otherwise all are fitted together, and what they do not
+    identify is unknown in the model. Raises InputError where records are not of one scanner or show
+    nothing, ScanError where a fit does not converge.
     """
     full, together = {}, {}
     given = [checked(record) for record in records]
@@ -143,15 +145,43 @@ def identify_records(
 def _of_any(
     records: Sequence[Record], axis: str, sizes: Sizes, progress: ProgressCallback
 ) -> AxisIdentification | FittedAxis:
-    """Identify an axis by its records of each kind, or else by all of them together."""
+    """Identify an axis by its records of each kind in turns, or else by all of them together.
+
+    Fits in turns are kept where they leave hardly anything of any record.
+    """
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
-    if not set(REQUIRED) <= set(first):
-        if sizes != DEFAULT_SIZES:
+    if sizes != DEFAULT_SIZES:
+        if not set(REQUIRED) <= set(first):
             raise InputError(
                 "levels, order and delay are of an identification from one record each of creep,"
                 " frequency and hysteresis: leave them out, or give these records"
             )
+        return _in_turns(first, records, axis, sizes, progress)
+    if not set(REQUIRED) <= set(first):
         return identify_together(records, axis, progress)
+    try:
+        found = _in_turns(first, records, axis, sizes, progress)
+        at_rest = [evolve(record, start="depolarised") for record in records]
+        left = _left_of_motion(found.model, at_rest, axis)
+    except (InputError, ScanError) as error:
+        progress(f"fits in turns: {error}")
+        return identify_together(records, axis, progress)
+    if left < DEFAULT_SETTINGS.left_in_turns:
+        return found
+    progress(f"fits in turns leave {left:.2%} of a record's motion")
+    together = identify_together(records, axis, progress)
+    lefts = [_left_of_motion(one.model, records, axis) for one in (found, together)]
+    return found if lefts[0] < lefts[1] else together
+
+
+def _in_turns(
+    first: Mapping[str, Record],
+    records: Sequence[Record],
+    axis: str,
+    sizes: Sizes,
+    progress: ProgressCallback,
+) -> AxisIdentification:
+    """Identify an axis by the first record of each kind; the others give the model's error."""
     signals = {kind: AxisRecord.of(record, axis) for kind, record in first.items()}
     creep, frequency, hysteresis = (signals[kind] for kind in REQUIRED)
     held_out = signals.get("validation")
@@ -159,6 +189,16 @@ def _of_any(
     further = [record for record in records if record not in first.values()]
     errors = (error_of(found.model, record, axis).model_discrepancy for record in further)
     return evolve(found, model=found.model.also_known(errors))
+
+
+def _left_of_motion(model: AxisModel, records: Sequence[Record], axis: str) -> float:
+    """Greatest share of a record's motion that a model leaves, above the sensor's noise.
+
+    Raises InputError where a drive leaves the identified range.
+    """
+    errors = (error_of(model, record, axis).model_discrepancy for record in records)
+    sizes = ((np.linalg.norm(one.rms), np.linalg.norm(one.displacement)) for one in errors)
+    return max(float(left / moved) for left, moved in sizes)
 
 
 def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
