@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -22,8 +22,10 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.extension import ExtensionSettings, extended
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
+from afm_scan_ros.core.prediction_error import standard_deviation
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 MODEL_FILE = "model.yaml"
+BEYOND = ("refuse", "extend")
+EXTENDED = f"{ExtensionSettings().share:.0%}"
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
 
 
@@ -109,7 +113,37 @@ class Model:
             raise InputError(f"{self.origin}: holds no fit: 'identify' makes models that do")
         return self._identification
 
-    def predict(self, drive: ArrayLike, sample_period: float, *, periodic: bool = False) -> Array:
+    @overload
+    def predict(
+        self,
+        drive: ArrayLike,
+        sample_period: float,
+        *,
+        beyond: str = ...,
+        return_std: Literal[False] = ...,
+        periodic: bool = ...,
+    ) -> Array: ...
+
+    @overload
+    def predict(
+        self,
+        drive: ArrayLike,
+        sample_period: float,
+        *,
+        beyond: str = ...,
+        return_std: Literal[True],
+        periodic: bool = ...,
+    ) -> tuple[Array, Array]: ...
+
+    def predict(
+        self,
+        drive: ArrayLike,
+        sample_period: float,
+        *,
+        beyond: str = "refuse",
+        return_std: bool = False,
+        periodic: bool = False,
+    ) -> Array | tuple[Array, Array]:
         """Return the displacement (m) for a drive (V), from depolarised rest at zero.
 
         Parameters
@@ -118,36 +152,68 @@ class Model:
             V, shape (n,) or (n, channels).
         sample_period
             s.
+        beyond
+            "refuse" a drive that leaves the identified range, or "extend" that range by a tenth of
+            the voltage at either end: branches go on with the slopes that they have there.
+        return_std
+            Whether to return the standard deviation of the prediction too.
         periodic
             Of coupled axes, whether the drive holds whole periods, in steady state.
 
         Returns
         -------
-        ndarray
+        moved : ndarray
             m, of the drive's shape. Effects that are unknown are left out; a warning in the log
             names them.
+        std : ndarray
+            m, of the drive's shape, without the sensor's noise: the rms that the model's error on
+            its records foresees of such motion. Beyond the identified range it also holds how far
+            the prediction is from a straight line there. Only where ``return_std``.
 
         Raises
         ------
         InputError
-            For arrays that are not of the model's axes, and where the drive leaves the range that
-            the model was identified in.
+            For arrays that are not of the model's axes, where the drive leaves the range, and where
+            a standard deviation is asked of a model that states no error.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import afm_scan_ros as afm
+        >>> drive = np.zeros((2000, 2))
+        >>> drive[:, 0] = np.sin(np.linspace(0.0, 2.0 * np.pi, 2000))
+        >>> moved, std = afm.load_model().predict(drive, 1e-4, return_std=True)
+        >>> bool(std[:, 0].max() < 1e-2 * np.ptp(moved[:, 0]))
+        True
         """
+        if beyond not in BEYOND:
+            raise InputError(f"beyond is {beyond!r}: give one of {', '.join(BEYOND)}")
         if not isinstance(self._scanner, ScannerModel):
+            if return_std or beyond != BEYOND[0]:
+                raise InputError(
+                    "a model of coupled axes predicts neither beyond its range nor a standard"
+                    " deviation: leave out beyond and return_std"
+                )
             return self._scanner.predict(
                 self._scanner.checked("drive", drive, sample_period), periodic=periodic
             )
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
+        model = self.scanner if beyond == BEYOND[0] else extended(self.scanner, given)
         try:
-            moved = predict(self.scanner, given)
+            moved = predict(model, given)
         except BeyondRangeError as error:
+            farther = "" if beyond == BEYOND[0] else f", of which {EXTENDED} more may be predicted"
             raise InputError(
                 f"drive is {error.value:.4g} V at sample {error.sample}, and the model was"
-                f" identified to {error.limit:.4g} V: give a smaller drive"
+                f" identified to {error.limit:.4g} V{farther}: give a smaller drive"
             ) from None
-        return self._like(drive, moved)
+        if not return_std:
+            return self._like(drive, moved)
+        return self._like(drive, moved), self._like(
+            drive, standard_deviation(self.scanner, given, moved)
+        )
 
     def invert(
         self,

@@ -133,8 +133,10 @@ def _about(
     bands = [one for each in spectra if (one := _band(each, omega, damping, settings)) is not None]
     if not bands:
         return None
-    matrix, right = sum(one.matrix for one in bands), sum(one.right for one in bands)
-    matrix = matrix + np.finfo(float).eps * np.trace(matrix) * np.eye(4)
+    matrix, right = (
+        np.sum([getattr(one, name) for one in bands], axis=0) for name in ("matrix", "right")
+    )
+    matrix += np.finfo(float).eps * np.trace(matrix) * np.eye(4)
     weights = np.linalg.solve(matrix, right)
     smooth = np.append(np.linalg.solve(matrix[:2, :2], right[:2]), [0.0, 0.0])
     least = np.finfo(float).eps

@@ -8,6 +8,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.extension import extended_axis
 from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import forward
@@ -61,9 +62,13 @@ def validate(
 
 
 def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -> Validation:
-    """Compare as ``validate`` does, of a sensor whose zero is arbitrary: no mean is compared."""
-    _refuse_beyond(model, record.drive, name)
-    both = residual_of(model, record), record.displacement
+    """Compare as ``validate`` does, of a sensor whose zero is arbitrary: no mean is compared.
+
+    A drive may leave the identified range by what predictions may. Raises InputError beyond that.
+    """
+    wider = extended_axis(model, record.drive)
+    _refuse_beyond(wider, record.drive, name)
+    both = residual_of(wider, record), record.displacement
     centred, moved = (signal[first:] - signal[first:].mean() for signal in both)
     return _validation(model, record, name, slice(first, None), centred, moved)
 
@@ -140,8 +145,8 @@ def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
     surface = model.hysteresis.forward
     if drive.min() < surface.lower or drive.max() > surface.upper:
         raise InputError(
-            f"{name} record: drives {drive.min():.3g} to {drive.max():.3g} V, identified are"
-            f" {surface.lower:.3g} to {surface.upper:.3g} V; keep the drive within these"
+            f"{name} record: drives {drive.min():.3g} to {drive.max():.3g} V, but the model goes"
+            f" from {surface.lower:.3g} to {surface.upper:.3g} V; keep the drive within these"
         )
 
 

@@ -1,0 +1,108 @@
+"""A model a little beyond the drive that it was identified in, for predictions alone.
+
+Branches go on with the slopes that they have at the ends of the range. How much displacement that
+adds is unknown by as much as these slopes differ from the mean one.
+"""
+
+import numpy as np
+from attrs import evolve, frozen
+
+from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
+from afm_scan_ros.core.settings import setting
+from afm_scan_ros.core.types import Array, Trace
+
+
+@frozen
+class ExtensionSettings:
+    """How far predictions go."""
+
+    share: float = setting(
+        0.1,
+        "1",
+        "share by which the voltages at the ends of the range may be exceeded",
+        "branches bend little over a tenth of the range",
+    )
+
+
+def extended(model: ScannerModel, drive: Trace) -> ScannerModel:
+    """Return the model with a wider range for each axis whose drive (V) leaves the identified one.
+
+    Where a drive goes farther than predictions do, the range stays, and does not hold it.
+    """
+    axes = {name: extended_axis(model.axis(name), getattr(drive, name)) for name in model.axes}
+    return evolve(model, **axes)
+
+
+def extended_axis(model: AxisModel, drive: Array) -> AxisModel:
+    """Return the same of one axis, whose drive (V) is of shape (n,)."""
+    forward, grown = model.hysteresis.forward, 1.0 + ExtensionSettings().share
+    lowest = min(forward.lower, grown * forward.lower)
+    highest = max(forward.upper, grown * forward.upper)
+    if _within(drive, forward.lower, forward.upper) or not _within(drive, lowest, highest):
+        return model
+    return evolve(model, hysteresis=evolve(model.hysteresis, forward=_wider(forward)))
+
+
+def _within(drive: Array, lower: float, upper: float) -> bool:
+    return bool(np.all((drive >= lower) & (drive <= upper)))
+
+
+def unknown_beyond(model: AxisModel, drive: Array) -> Array:
+    """How far a slow prediction (m), (n,), is from a straight line where it is beyond the range."""
+    forward = model.hysteresis.forward
+    inside = np.clip(drive, forward.lower, forward.upper)
+    if np.array_equal(inside, drive):
+        return np.zeros(len(drive))
+    effects = effect_of(_wider(forward)), effect_of(forward)
+    within, at_ends = (
+        effect.apply(effect.at_rest(), at)[1]
+        for effect, at in zip(effects, (drive, inside), strict=True)
+    )
+    bent = within - at_ends - forward.chord * (drive - inside)
+    return np.asarray(np.abs(model.vibration.static_gain * bent))
+
+
+def _wider(operator: HysteresisOperator) -> HysteresisOperator:
+    return _slopes(operator) if isinstance(operator, DuhemSlopes) else _surface(operator)
+
+
+def _surface(surface: EverettSurface) -> EverettSurface:
+    """Add a level beyond either end that is not 0 V, up to which E goes on straight.
+
+    The scanner rests depolarised at the same output.
+    """
+    grown = 1.0 + ExtensionSettings().share
+    levels, values = surface.levels, np.tril(surface.values)
+    if surface.upper > 0.0:
+        levels, values = _with_level(levels, values, grown * surface.upper)
+    if surface.lower < 0.0:
+        # E changes its sign where alpha and beta change places, and both their signs.
+        turned = _with_level(-levels[::-1], values[::-1, ::-1].T, -grown * surface.lower)
+        levels, values = -turned[0][::-1], turned[1][::-1, ::-1].T
+    bias = None if surface.bias is None else grown**2 * surface.bias
+    wider = EverettSurface(levels[0], levels[-1], values, surface.offset, bias, levels)
+    rests = [Preisach(one).at_rest().now[1] for one in (surface, wider)]
+    return evolve(wider, offset=surface.offset + rests[0] - rests[1])
+
+
+def _with_level(levels: Array, values: Array, upper: float) -> tuple[Array, Array]:
+    """Add a level above the others, with E at its slope over alpha below the last of them."""
+    rises = values[-1] - np.append(values[-2, :-1], 0.0)
+    rises[-1] = values[-1, -2]
+    last = values[-1] + (upper - levels[-1]) / (levels[-1] - levels[-2]) * rises
+    return np.append(levels, upper), np.vstack([np.pad(values, ((0, 0), (0, 1))), [*last, 0.0]])
+
+
+def _slopes(slopes: DuhemSlopes) -> DuhemSlopes:
+    """Add a cell beyond either end, of the slopes on the edge."""
+    _, cell, *_ = slopes.grid
+    rising, falling = (
+        np.pad(each, ((1, 1), (0, 0)), mode="edge") for each in (slopes.rising, slopes.falling)
+    )
+    centre = np.pad(slopes.centre, 1, mode="edge")
+    ends = slopes.lower - cell, slopes.upper + cell
+    wider = DuhemSlopes(*ends, 0.0, slopes.rest, slopes.widths, centre, rising, falling)
+    return evolve(wider, offset=slopes.offset - wider.height(slopes.lower))
