@@ -14,6 +14,7 @@ from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
+from helpers.fit_cases import of_bouc_wen
 
 FAST, SLOW = 1e-4, 1e-2
 RNG = 3
@@ -184,3 +185,15 @@ def test_axes_driven_one_after_the_other_are_both_identified(tmp_path: Path) -> 
     assert model.axes == ("x", "y")
     for effects in model.effects.values():
         assert [status.status.value for _, status in effects.each()] == ["identified"] * 3
+
+
+@pytest.mark.evidence
+def test_what_fits_in_turns_leave_is_fitted_together(tmp_path: Path) -> None:
+    """Bouc-Wen: minor loops that are not congruent, which no surface has."""
+    *fitted, check = written(tmp_path, calibration(), Stage(hysteresis=of_bouc_wen))
+    done = run([*fitted, "--validation", check], tmp_path / "model.yaml")
+    assert done.exit_code == 0, done.exception
+    assert "hysteresis by one state" in done.output
+    known = afm.load_model(tmp_path / "model.yaml").scanner.axis("x").model_discrepancy
+    assert known is not None
+    assert np.linalg.norm(known.rms) < 2e-3 * np.linalg.norm(known.displacement)

@@ -120,7 +120,8 @@ def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
 
 
 def signals(drive: Array, moved: Array, block: int) -> Signals:
-    found = signals_of("a", drive, moved, PERIOD, depolarised=True, settings=SETTINGS)
+    given, ends = ("a", drive, moved, PERIOD), (-LIMIT, LIMIT)
+    found = signals_of(*given, depolarised=True, ends=ends, settings=SETTINGS)
     return evolve(found, block=block)
 
 

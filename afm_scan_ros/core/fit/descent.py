@@ -31,15 +31,20 @@ VIBRATION = ("lags", "modes")
 def settle(
     fit: AxisFit, steps: int, groups: Sequence[str] = (), *, searching: bool = False
 ) -> None:
-    """Take steps until the objective falls no more, weighing the records after each."""
+    """Take steps until the objective falls no more, weighing the records after each.
+
+    Where ``searching``, the scales are to stay the same too.
+    """
     for _ in range(steps):
-        before = fit.discrepancy
+        before, scales, near = fit.discrepancy, fit.scales, fit.converged or fit.quadratic
         fell = step(fit, groups, searching=searching)
         fell -= fit.cover(fell)
         fit.weigh()
         heavier = max(1.0, before / fit.discrepancy) ** 2
         fit.remaining = heavier * abs(fit.remaining - fell)
-        if fell == 0.0 or fit.converged:
+        kept = fit.scales == scales
+        chosen = not searching or (near and kept)
+        if (chosen and fit.converged) or (fell == 0.0 and kept and not fit.converged):
             break
 
 
@@ -47,16 +52,16 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     """Take a step of some groups of parameters, or of all; return how far the objective fell.
 
     Where ``searching``, the scales of the greatest evidence are chosen first, if the last step
-    showed the objective to be as quadratic as that evidence takes it to be. A parameter that would
-    fall below its lowest value stays there for this step, and so does a map behind the operator
-    that would turn back on every step.
+    showed the objective to be as quadratic as that evidence takes it to be, or had converged. A
+    parameter that would fall below its lowest value stays there for this step, and so does a map
+    behind the operator that would turn back on every step.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in groups or fit.layout.parts:
         free[fit.layout.parts[name]] = True
     held = not free[: fit.layout.parts["map"].stop].any()
     matrix, right = fit.normal(with_operator=not held)
-    if searching and fit.quadratic:
+    if searching and (fit.quadratic or fit.converged):
         fit.scales = best_scales(fit.layout, fit.scales, fit.theta, matrix, right)
     precision, mean = fit.layout.prior(fit.scales, fit.theta)
     right -= precision @ (fit.theta - mean)

@@ -192,13 +192,19 @@ def _in_turns(
 
 
 def _left_of_motion(model: AxisModel, records: Sequence[Record], axis: str) -> float:
-    """Greatest share of a record's motion that a model leaves, above the sensor's noise.
+    """Greatest share of a record's motion that a model leaves, above the sensor's noise and hum.
 
     Raises InputError where a drive leaves the identified range.
     """
-    errors = (error_of(model, record, axis).model_discrepancy for record in records)
+    quiet = (_without_hum(record, axis) for record in records)
+    errors = (error_of(model, record, axis).model_discrepancy for record in quiet)
     sizes = ((np.linalg.norm(one.rms), np.linalg.norm(one.displacement)) for one in errors)
     return max(float(left / moved) for left, moved in sizes)
+
+
+def _without_hum(record: Record, axis: str) -> Record:
+    quiet, _ = AxisRecord.of(record, axis).without_hum()
+    return evolve(record, displacement=quiet.displacement[:, np.newaxis])
 
 
 def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
