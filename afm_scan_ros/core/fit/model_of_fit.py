@@ -17,7 +17,8 @@ from afm_scan_ros.core.model import AxisModel, HysteresisModel
 def model_of(fit: AxisFit) -> AxisModel:
     """Return the model that a fit has found, with F = 0 at depolarised rest.
 
-    Raises InputError where the operator found does not grow everywhere, so that it has no inverse.
+    Where plays found do not grow everywhere, they are mixed with a straight line so far that they
+    have an inverse.
     """
     dynamics = fit.layout.dynamics(fit.theta)
     return AxisModel(_hysteresis(fit), dynamics.vibration(fit.gain), dynamics.creep())
@@ -27,7 +28,9 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     layout, theta = fit.layout, fit.layout.of_operator(fit.theta)
     levels = layout.settings.direct_levels
     if isinstance(layout.operator, Plays):
-        surface, mapped = from_rest(layout.operator.surface(theta), layout.map_of(fit.theta))
+        surface, mapped = from_rest(
+            layout.operator.surface(theta, mixed=True), layout.map_of(fit.theta)
+        )
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
     slopes = layout.operator.slopes(theta)
     nearest = nearest_surface(slopes, layout.settings)

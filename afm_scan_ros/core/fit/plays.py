@@ -211,10 +211,12 @@ class Plays:
         """Levels of the Everett surface, V."""
         return np.linspace(self.lower, self.upper, self.settings.surface_levels)
 
-    def surface(self, theta: Array) -> EverettSurface:
+    def surface(self, theta: Array, *, mixed: bool = False) -> EverettSurface:
         """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
 
-        Plays that the range cannot push both ways stay where they have settled.
+        Plays that the range cannot push both ways stay where they have settled. Where the surface
+        does not grow, as a fit that has not converged may leave it, it may be ``mixed`` with a
+        straight line so far that it does. Raises InputError where it does not.
         """
         levels = self.levels
         values, offset = np.zeros((len(levels),) * 2), 0.0
@@ -230,7 +232,20 @@ class Plays:
             )
             values += 0.5 * (risen - fallen)
             offset += float(np.interp(self.lower + r, self.positions, table))
-        return EverettSurface(self.lower, self.upper, np.tril(values, -1), offset)
+        values = np.tril(values, -1)
+        share = _straight_share(values, levels, self.settings.least_slope) if mixed else 0.0
+        values += share * (np.tril(0.5 * (levels[:, np.newaxis] - levels)) - values)
+        return EverettSurface(
+            self.lower, self.upper, values, offset + share * (self.lower - offset)
+        )
+
+
+def _straight_share(values: Array, levels: Array, least: float) -> float:
+    """Share of a straight line with which a surface grows everywhere by a ``least`` slope, 1."""
+    inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
+    rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
+    lowest = float(min(map(np.min, rises))) / half
+    return max(least - lowest, 0.0) / (1.0 - min(lowest, least))
 
 
 @compiled

@@ -64,6 +64,9 @@ def test_conditions_tell_where_a_surface_does_not_grow(seed: int, low: float) ->
     if lacks.max() > 1.01 * least:
         with pytest.raises(InputError, match="does not grow"):
             plays.surface(theta)
+    mixed = plays.surface(theta, mixed=True)
+    lowest = 2.0 * np.diff(mixed.values, axis=0)[np.tri(len(mixed.values), dtype=bool)[:-1]].min()
+    assert lowest / np.diff(mixed.levels)[0] > 0.99 * SETTINGS.least_slope
     move = 1e-9 * rng.standard_normal(theta.size)
     _, moved = growth.lacking(theta + move)
     np.testing.assert_allclose(moved - lacks, -rows @ move, atol=1e-6 * least)
