@@ -108,9 +108,10 @@ def identify(
 
     Notes
     -----
-    An axis with one each of creep, frequency and hysteresis is identified from these three, which
-    begin depolarised, at rest at zero. Its further records are held out and give the model's error.
-    The records of any other axis are fitted together.
+    An axis with one each of creep, frequency and hysteresis is identified from these three, as if
+    they began depolarised, at rest at zero, where that leaves less than 0.1 % of the motion of any
+    record. Its further records are then held out and give the model's error. All other records are
+    fitted together.
 
     Records of more than two axes are of coupled ones: of a multisine that drives all of them, each
     of another realisation, in steady state for two periods or more. So are such records of two
@@ -119,11 +120,11 @@ def identify(
     Examples
     --------
     >>> import numpy as np
+    >>> from scipy.signal import lfilter
     >>> import afm_scan_ros as afm
-    >>> steps = np.repeat([0.0, 0.5, 1.0, 0.0], 2000)
-    >>> seconds = 0.01 * np.arange(len(steps)) - 20.0
-    >>> moved = 5e-6 * (steps + 0.1 * (seconds > 0.0) * (1.0 - np.exp(-seconds / 5.0)))
-    >>> moved += np.random.default_rng(1).normal(0.0, 1e-9, len(moved))
+    >>> steps, kept = np.repeat([0.0, 0.5, 1.0, 0.0], 2000), np.exp(-0.01 / 5.0)
+    >>> creep = 0.1 * lfilter([0.0, 1.0 - kept], [1.0, -kept], steps)
+    >>> moved = 5e-6 * (steps + creep) + np.random.default_rng(1).normal(0.0, 1e-9, len(steps))
     >>> model = afm.identify([afm.Record(steps, moved, sample_period=0.01)])
     >>> {name: status.status.value for name, status in model.effects["x"].each()}
     {'creep': 'identified', 'hysteresis': 'unknown', 'vibration': 'unknown'}

@@ -245,7 +245,7 @@ def _straight_share(values: Array, levels: Array, least: float) -> float:
     inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
     rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
     lowest = float(min(map(np.min, rises))) / half
-    return max(least - lowest, 0.0) / (1.0 - min(lowest, least))
+    return float(max(least - lowest, 0.0) / (1.0 - min(lowest, least)))
 
 
 @compiled

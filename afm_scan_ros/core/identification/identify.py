@@ -14,6 +14,7 @@ from attrs import evolve, field, frozen
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.identification.agreement import (
+    UnlikeRecordsError,
     cross_findings,
     loops_after,
     refuse_other_gain,
@@ -163,7 +164,7 @@ def _of_any(
         found = _in_turns(first, records, axis, sizes, progress)
         at_rest = [evolve(record, start="depolarised") for record in records]
         left = _left_of_motion(found.model, at_rest, axis)
-    except (InputError, ScanError) as error:
+    except (UnlikeRecordsError, ScanError) as error:
         progress(f"fits in turns: {error}")
         return identify_together(records, axis, progress)
     if left < DEFAULT_SETTINGS.left_in_turns:

@@ -36,7 +36,8 @@ def test_a_bounded_move_is_that_of_bounded_least_squares(seed: int, size: int) -
     free = rng.random(size) < 0.9
     move = bounded(columns.T @ columns, columns.T @ data, free, lowest)
     ends = np.where(free, lowest, -1e-12), np.where(free, np.inf, 1e-12)
-    expected = optimize.lsq_linear(columns, data, ends, method="bvls", tol=1e-14).x
+    options = {"method": "bvls", "tol": 1e-14, "max_iter": 100 * size}
+    expected = optimize.lsq_linear(columns, data, ends, **options).x
     np.testing.assert_allclose(move, expected, atol=1e-6)
 
 
