@@ -9,8 +9,8 @@ from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.plays import Plays
-from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.plays import Plays, straight_share
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.model import AxisModel, HysteresisModel
 
 
@@ -53,7 +53,8 @@ def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> 
     """Return the direct inverse's surface of ``count`` levels, from the exact inverse.
 
     U(alpha, beta) is half of what the drive falls by as F falls from alpha to beta, after it has
-    risen from the least F. Croft, Shed and Devasia (2001), Eq. 16, from F to u.
+    risen from the least F. Croft, Shed and Devasia (2001), Eq. 16, from F to u. Where U hardly
+    grows between two levels it is mixed with a straight line.
     """
     behind = () if mapped is None else (mapped,)
     whole = Cascade((Preisach(surface), *behind))
@@ -66,6 +67,8 @@ def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> 
         there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
         drive = whole.invert(saturated, there_and_back)[1]
         values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
+    share = straight_share(values, levels, DEFAULT_SETTINGS.least_slope)
+    values += share * (np.tril(0.5 * (levels[:, np.newaxis] - levels)) - values)
     return EverettSurface(float(low), float(high), values, surface.lower)
 
 
@@ -84,4 +87,4 @@ def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurfac
     theta = np.zeros_like(plays.unbent())
     theta[: len(density)] = density
     theta[0] = max(theta[0], settings.least_slope)
-    return plays.surface(theta)
+    return plays.surface(theta, mixed=True)

@@ -233,14 +233,14 @@ class Plays:
             values += 0.5 * (risen - fallen)
             offset += float(np.interp(self.lower + r, self.positions, table))
         values = np.tril(values, -1)
-        share = _straight_share(values, levels, self.settings.least_slope) if mixed else 0.0
+        share = straight_share(values, levels, self.settings.least_slope) if mixed else 0.0
         values += share * (np.tril(0.5 * (levels[:, np.newaxis] - levels)) - values)
         return EverettSurface(
             self.lower, self.upper, values, offset + share * (self.lower - offset)
         )
 
 
-def _straight_share(values: Array, levels: Array, least: float) -> float:
+def straight_share(values: Array, levels: Array, least: float) -> float:
     """Share of a straight line with which a surface grows everywhere by a ``least`` slope, 1."""
     inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
     rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
