@@ -120,8 +120,7 @@ def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
 
 
 def signals(drive: Array, moved: Array, block: int) -> Signals:
-    given, ends = ("a", drive, moved, PERIOD), (-LIMIT, LIMIT)
-    found = signals_of(*given, depolarised=True, ends=ends, settings=SETTINGS)
+    found = signals_of("a", drive, moved, PERIOD, depolarised=True, settings=SETTINGS)
     return evolve(found, block=block)
 
 

@@ -155,7 +155,6 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
             record.displacement[:, 0],
             record.sample_period,
             depolarised=record.depolarised,
-            ends=(min(map(np.min, drives)), max(map(np.max, drives))),
             settings=settings,
         )
         for record, drive in zip(given, drives, strict=True)

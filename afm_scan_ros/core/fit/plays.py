@@ -160,9 +160,7 @@ class Plays:
         """
         if rested:
             return np.zeros(len(self.thresholds))
-        least = np.minimum(self.thresholds, self.half)
-        within = np.clip(float(drive[0]), self.lower + least, self.upper - least)
-        return np.where(self.thresholds > self.half, self.settled, within)
+        return np.where(self.thresholds > self.half, self.settled, float(drive[0]))
 
     def weights(self, theta: Array) -> tuple[Array, Array]:
         """Density d_r, shape (plays,), and the correction's Σ_j c_j(r) b_j as (plays, splines)."""

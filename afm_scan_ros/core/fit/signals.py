@@ -95,13 +95,9 @@ def signals_of(
     period: float,
     *,
     depolarised: bool,
-    ends: tuple[float, float],
     settings: FitSettings,
 ) -> Signals:
-    """Choose the blocks of a record, and from where on its memory is known.
-
-    The scanner is driven to ``ends`` (V) in all records.
-    """
+    """Choose the blocks of a record, and from where on its memory is known."""
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
     if len(drive) < settings.fewest_blocks:
@@ -109,8 +105,7 @@ def signals_of(
             f"{name}: holds only {len(drive)} samples: give a record of"
             f" {settings.fewest_blocks} at least"
         )
-    known = known_from(drive, settings, depolarised=depolarised)
-    first = min(known, wiped_from(drive, ends, settings))
+    first = known_from(drive, settings, depolarised=depolarised)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise)
 
 
@@ -205,14 +200,3 @@ def known_from(drive: Array, settings: FitSettings, *, depolarised: bool) -> int
     first = max(int(np.argmax(end)) for end in ends)
     enough = len(drive) - first >= settings.fewest_blocks and np.ptp(drive[first:]) > within
     return first if enough else 0
-
-
-def wiped_from(drive: Array, ends: tuple[float, float], settings: FitSettings) -> int:
-    """Sample from which on the memory is known of a scanner that was never driven beyond ``ends``.
-
-    One of these (V) wipes out all, as nothing outlasts it. Where the drive reaches neither, that is
-    the record's length.
-    """
-    within = settings.near_end * (ends[1] - ends[0])
-    outer = (drive >= ends[1] - within) | (drive <= ends[0] + within)
-    return int(np.argmax(outer)) if outer.any() else len(drive)

@@ -13,7 +13,6 @@ from afm_scan_ros.core.fit.signals import (
     known_from,
     longest_block,
     noise_of,
-    wiped_from,
 )
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
@@ -70,13 +69,6 @@ def test_memory_is_known_from_rest_or_from_both_ends() -> None:
     path = np.interp(np.arange(2500), 500.0 * np.arange(6), [0.0, 1.0, -2.0, 2.0, -1.0, 2.0])
     assert known_from(path, SETTINGS, depolarised=True) == 0
     assert abs(known_from(path, SETTINGS, depolarised=False) - 1500) < 10
-
-
-def test_one_end_of_all_drives_wipes_out_what_was_before() -> None:
-    path = np.interp(np.arange(2500), 500.0 * np.arange(6), [0.0, 1.0, -1.0, 2.0, -1.0, 2.0])
-    assert abs(wiped_from(path, (-3.0, 2.0), SETTINGS) - 1500) < 10
-    assert abs(wiped_from(path, (-1.0, 3.0), SETTINGS) - 1000) < 20
-    assert wiped_from(path, (-3.0, 3.0), SETTINGS) == len(path)
 
 
 @pytest.mark.parametrize(

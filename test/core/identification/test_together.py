@@ -64,7 +64,7 @@ def swinging(seconds: float, envelope: Array, rate: float = 1.0) -> Array:
 
 LOOPS = swinging(30.0, np.array([1.0, 1.0, 0.1, 0.9]))
 FRESH = swinging(20.0, np.array([0.9, 0.2, 0.7, 0.1, 0.8]), rate=0.7)
-HIGHEST = int(np.argmax(LOOPS))
+LOWEST = int(np.argmin(LOOPS))
 ORIGIN = -96e-6  # m
 
 
@@ -129,7 +129,7 @@ def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
 def test_what_precedes_a_known_memory_is_named(fit: FittedAxis) -> None:
     unknown = [each for each in fit.warnings if isinstance(each, UnknownStart)]
     lengths = [each.seconds for each in unknown]
-    assert all(HIGHEST - 10 < each / SAMPLE_PERIOD <= HIGHEST for each in lengths)
+    assert all(LOWEST - 10 < each / SAMPLE_PERIOD <= LOWEST for each in lengths)
 
 
 def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
