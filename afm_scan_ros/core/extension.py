@@ -70,16 +70,16 @@ def _wider(operator: HysteresisOperator) -> HysteresisOperator:
 
 
 def _surface(surface: EverettSurface) -> EverettSurface:
-    """Add a level beyond either end that is not 0 V, up to which E goes on straight.
+    """Add a level above an upper end over 0 V, and one below a lower end under 0 V.
 
-    The scanner rests depolarised at the same output.
+    Up to these E goes on straight. The output at depolarised rest stays the same.
     """
     grown = 1.0 + ExtensionSettings().share
     levels, values = surface.levels, np.tril(surface.values)
     if surface.upper > 0.0:
         levels, values = _with_level(levels, values, grown * surface.upper)
     if surface.lower < 0.0:
-        # E changes its sign where alpha and beta change places, and both their signs.
+        # Where the signs of alpha and beta change, and so their places, E is the same.
         turned = _with_level(-levels[::-1], values[::-1, ::-1].T, -grown * surface.lower)
         levels, values = -turned[0][::-1], turned[1][::-1, ::-1].T
     bias = None if surface.bias is None else grown**2 * surface.bias

@@ -10,8 +10,9 @@ import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.extension import ExtensionSettings, extended_axis, unknown_beyond
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
-from afm_scan_ros.core.types import Array
-from helpers.in_process import default_model
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.types import Array, channels_of
+from helpers.in_process import ALL, default_model, scan
 
 SHARE, PERIOD = ExtensionSettings().share, 1e-4
 
@@ -74,6 +75,17 @@ def test_beyond_the_range_the_deviation_grows_and_a_farther_drive_is_refused() -
     assert np.ptp(within[:, 0]) == 0.0
     assert beyond[1000, 0] > beyond[0, 0] > 0.0
     assert beyond[1000, 0] < 0.05 * np.ptp(moved[:, 0])
+
+
+@pytest.mark.parametrize(("rate", "size"), [(1.0, 40e-6), (5.0, 20e-6), (100.0, 10e-6)])
+def test_the_deviation_is_about_the_true_error(rate: float, size: float) -> None:
+    """Of scans of the simulated scanner, whose records of them the model has not seen."""
+    done = scan(ScanSpec(line_rate=rate, lines=6, range_x=size, range_y=size), ALL)
+    drive, true = (channels_of(one, ("x", "y")) for one in (done.drive, done.true))
+    moved, std = afm.load_model().predict(drive, done.spec.sample_period, return_std=True)
+    ratio = np.sqrt(np.mean((moved - true) ** 2, axis=0)) / std[0]
+    assert (ratio > 1.0 / 2.5).all()
+    assert (ratio < 1.3).all()
 
 
 def test_a_model_that_states_no_error_has_no_deviation() -> None:

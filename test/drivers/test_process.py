@@ -260,8 +260,9 @@ def test_a_ramp_that_hangs_is_named_and_ended(opened: Open) -> None:
     driver.advance(drive(0, 10), last=False)
     assert driver.answer(PATIENCE) is not None
     said = driver.ramp_down("interrupted")
-    if not said.startswith(f"interrupted; {KILLED}"):  # ended before the wait for its word was
-        assert said == "interrupted; the driver has not said that the drive is at rest"
+    ended = f"interrupted; {KILLED}"  # where the process is ended before the wait for its word is
+    waited = "interrupted; the driver has not said that the drive is at rest"
+    assert said in {waited, ended, f"{ended}; the drive may not be at rest"}
     driver.close()
 
 

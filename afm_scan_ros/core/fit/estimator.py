@@ -72,9 +72,7 @@ class AxisFit:
     grows: bool = False
     damping: float = field()
     _columns: dict[int, list[Columns]] = field(factory=dict)
-    _regressors: dict[int, tuple[tuple[tuple[float, ...], int], Array, Array, Array]] = field(
-        factory=dict
-    )
+    _regressors: dict[int, tuple[object, Array, Array]] = field(factory=dict)
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
@@ -283,11 +281,11 @@ class AxisFit:
     def _free(self, k: int) -> _Free:
         """What is free in a record; its regressors are kept while they stay the same."""
         record, slow = self.records[k], self.layout.time_constants
-        key = record.tones, id(slow)
+        key = record.tones, tuple(slow)
         if k not in self._regressors or self._regressors[k][0] != key:
             columns = record.regressors(slow, self.layout.settings.creep)
-            self._regressors[k] = key, slow, columns, columns.T @ columns
-        return _Free(*self._regressors[k][2:], self.variance(record))
+            self._regressors[k] = key, columns, columns.T @ columns
+        return _Free(*self._regressors[k][1:], self.variance(record))
 
     def _pieces_of(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept."""

@@ -6,10 +6,10 @@ from scipy.optimize import nnls
 
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.plays import Plays, straight_share
+from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.model import AxisModel, HysteresisModel
 
@@ -67,8 +67,7 @@ def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> 
         there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
         drive = whole.invert(saturated, there_and_back)[1]
         values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
-    share = straight_share(values, levels, DEFAULT_SETTINGS.least_slope)
-    values += share * (np.tril(0.5 * (levels[:, np.newaxis] - levels)) - values)
+    values, _ = grown(values, levels, DEFAULT_SETTINGS.least_slope)
     return EverettSurface(float(low), float(high), values, surface.lower)
 
 

@@ -22,7 +22,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.types import Array
 
@@ -231,19 +231,12 @@ class Plays:
             values += 0.5 * (risen - fallen)
             offset += float(np.interp(self.lower + r, self.positions, table))
         values = np.tril(values, -1)
-        share = straight_share(values, levels, self.settings.least_slope) if mixed else 0.0
-        values += share * (np.tril(0.5 * (levels[:, np.newaxis] - levels)) - values)
+        share = 0.0
+        if mixed:
+            values, share = grown(values, levels, self.settings.least_slope)
         return EverettSurface(
             self.lower, self.upper, values, offset + share * (self.lower - offset)
         )
-
-
-def straight_share(values: Array, levels: Array, least: float) -> float:
-    """Share of a straight line with which a surface grows everywhere by a ``least`` slope, 1."""
-    inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
-    rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
-    lowest = float(min(map(np.min, rises))) / half
-    return float(max(least - lowest, 0.0) / (1.0 - min(lowest, least)))
 
 
 @compiled

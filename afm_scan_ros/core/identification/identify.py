@@ -148,7 +148,8 @@ def _of_any(
 ) -> AxisIdentification | FittedAxis:
     """Identify an axis by its records of each kind in turns, or else by all of them together.
 
-    Fits in turns are kept where they leave hardly anything of any record.
+    Fits in turns are kept where they leave hardly anything of any record. A record that is to
+    validate has no part in that choice.
     """
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
     if sizes != DEFAULT_SIZES:
@@ -162,8 +163,9 @@ def _of_any(
         return identify_together(records, axis, progress)
     try:
         found = _in_turns(first, records, axis, sizes, progress)
-        at_rest = [evolve(record, start="depolarised") for record in records]
-        left = _left_of_motion(found.model, at_rest, axis)
+        judging = [record for record in records if record.kind != "validation"]
+        at_rest = [evolve(record, start="depolarised") for record in judging]
+        left = _worst_share_left(found.model, at_rest, axis)
     except (UnlikeRecordsError, ScanError) as error:
         progress(f"fits in turns: {error}")
         return identify_together(records, axis, progress)
@@ -171,7 +173,7 @@ def _of_any(
         return found
     progress(f"fits in turns leave {left:.2%} of a record's motion")
     together = identify_together(records, axis, progress)
-    lefts = [_left_of_motion(one.model, records, axis) for one in (found, together)]
+    lefts = [_worst_share_left(one.model, judging, axis) for one in (found, together)]
     return found if lefts[0] < lefts[1] else together
 
 
@@ -192,7 +194,7 @@ def _in_turns(
     return evolve(found, model=found.model.also_known(errors))
 
 
-def _left_of_motion(model: AxisModel, records: Sequence[Record], axis: str) -> float:
+def _worst_share_left(model: AxisModel, records: Sequence[Record], axis: str) -> float:
     """Greatest share of a record's motion that a model leaves, above the sensor's noise and hum.
 
     Raises InputError where a drive leaves the identified range.

@@ -60,7 +60,7 @@ def test_a_record_of_another_unit_is_named() -> None:
 
 
 def test_the_gain_of_one_scanner_may_grow_with_its_swing_and_not_fall() -> None:
-    """Of ceramics, that of a strong field is up to three times that of a weak one."""
+    """Loops of a small swing follow a smaller part of the plays."""
     given = records(0.3e-6)
     shrunk = evolve(given[0], displacement=given[0].displacement / 3.0)
     check([shrunk, *given[1:]])

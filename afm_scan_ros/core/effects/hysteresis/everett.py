@@ -126,6 +126,20 @@ class EverettSurface:
         return evolve(self, values=values, offset=float(offset))
 
 
+def grown(values: Array, levels: Array, least: float) -> tuple[Array, float]:
+    """Mix E of ``values``, on evenly spaced ``levels`` (V), with that of no hysteresis.
+
+    Returns the mixture that grows everywhere by a ``least`` slope (1), and the share of the latter
+    in it; that is 0 where E grows so far itself.
+    """
+    inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
+    rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
+    lowest = float(min(map(np.min, rises))) / half
+    share = float(max(least - lowest, 0.0) / (1.0 - min(lowest, least)))
+    straight = np.tril(0.5 * (levels[:, np.newaxis] - levels))
+    return values + share * (straight - values), share
+
+
 def evenly_spaced(surface: EverettSurface) -> EverettSurface:
     """Return a surface of as many levels, evenly spaced, read from one with others."""
     if surface.uneven is None:

@@ -77,7 +77,7 @@ class OutputMap(StatelessEffect):
         for j, coefficient in enumerate(self.coefficients):
             powers[j + 2] += coefficient
             powers[j % 2] -= coefficient
-        return _bent(outputs, self.lower, 0.5 * (self.upper - self.lower), powers)
+        return _bent_by(outputs, self.lower, 0.5 * (self.upper - self.lower), powers)
 
     def input(self, outputs: Array) -> Array:
         """Operator's outputs A (V) for effective inputs F (V), both (n,)."""
@@ -93,8 +93,8 @@ class OutputMap(StatelessEffect):
 
 
 @compiled
-def _bent(outputs: Array, lower: float, half: float, powers: Array) -> tuple[Array, Array]:
-    """F + p(z) and its slope, p being straight beyond -1 and 1."""
+def _bent_by(outputs: Array, lower: float, half: float, powers: Array) -> tuple[Array, Array]:
+    """F + p(z) and its slope, p being a polynomial that goes on straight beyond -1 and 1."""
     bent, slope = np.empty(outputs.size), np.empty(outputs.size)
     for k in range(outputs.size):
         beyond = (outputs[k] - lower) / half - 1.0
