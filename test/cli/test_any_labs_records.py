@@ -188,9 +188,12 @@ def test_axes_driven_one_after_the_other_are_both_identified(tmp_path: Path) -> 
 
 
 @pytest.mark.evidence
-def test_what_fits_in_turns_leave_is_fitted_together(tmp_path: Path) -> None:
-    """Bouc-Wen: minor loops that are not congruent, which no surface has."""
+def test_a_held_out_record_decides_between_fits_in_turns_and_of_all(tmp_path: Path) -> None:
+    """Bouc-Wen: in turns leaves 1.8 % of the waves, and all together err by 3 % on the check."""
     *fitted, check = written(tmp_path, calibration(), Stage(hysteresis=of_bouc_wen))
     done = run([*fitted, "--validation", check], tmp_path / "model.yaml")
     assert done.exit_code == 0, done.exception
     assert "more evidence than plays" in done.output
+    known = afm.load_model(tmp_path / "model.yaml").scanner.axis("x").model_discrepancy
+    assert known is not None
+    assert np.linalg.norm(known.rms) < 0.015 * np.linalg.norm(known.displacement)

@@ -148,8 +148,9 @@ def _of_any(
 ) -> AxisIdentification | FittedAxis:
     """Identify an axis by its records of each kind in turns, or else by all of them together.
 
-    Fits in turns are kept where they leave hardly anything of any record. A record that is to
-    validate has no part in that choice.
+    Fits in turns are kept where they leave hardly anything of any record. A record that they
+    explain so from depolarised rest did begin there. Of two models that is kept which leaves less
+    of the record that neither was fitted to, or without one, less of the worst record.
     """
     first = {record.kind: record for record in reversed(records) if record.kind is not None}
     if sizes != DEFAULT_SIZES:
@@ -163,17 +164,20 @@ def _of_any(
         return identify_together(records, axis, progress)
     try:
         found = _in_turns(first, records, axis, sizes, progress)
-        judging = [record for record in records if record.kind != "validation"]
-        at_rest = [evolve(record, start="depolarised") for record in judging]
-        left = _worst_share_left(found.model, at_rest, axis)
+        at_rest = [evolve(record, start="depolarised") for record in records]
+        left = _shares_left(found.model, at_rest, axis)
     except (UnlikeRecordsError, ScanError) as error:
         progress(f"fits in turns: {error}")
         return identify_together(records, axis, progress)
-    if left < DEFAULT_SETTINGS.left_in_turns:
+    most = DEFAULT_SETTINGS.left_in_turns
+    if max(left) < most:
         return found
-    progress(f"fits in turns leave {left:.2%} of a record's motion")
-    together = identify_together(records, axis, progress)
-    lefts = [_worst_share_left(one.model, judging, axis) for one in (found, together)]
+    progress(f"fits in turns leave {max(left):.2%} of a record's motion")
+    pairs = zip(records, at_rest, left, strict=True)
+    begun = [resting if share < most else record for record, resting, share in pairs]
+    together = identify_together(begun, axis, progress)
+    judging = [record for record in begun if record.kind == "validation"] or begun
+    lefts = [max(_shares_left(one.model, judging, axis)) for one in (found, together)]
     return found if lefts[0] < lefts[1] else together
 
 
@@ -194,15 +198,15 @@ def _in_turns(
     return evolve(found, model=found.model.also_known(errors))
 
 
-def _worst_share_left(model: AxisModel, records: Sequence[Record], axis: str) -> float:
-    """Greatest share of a record's motion that a model leaves, above the sensor's noise and hum.
+def _shares_left(model: AxisModel, records: Sequence[Record], axis: str) -> list[float]:
+    """Share of each record's motion that a model leaves, above the sensor's noise and hum.
 
     Raises InputError where a drive leaves the identified range.
     """
     quiet = (_without_hum(record, axis) for record in records)
     errors = (error_of(model, record, axis).model_discrepancy for record in quiet)
     sizes = ((np.linalg.norm(one.rms), np.linalg.norm(one.displacement)) for one in errors)
-    return max(float(left / moved) for left, moved in sizes)
+    return [float(left / moved) for left, moved in sizes]
 
 
 def _without_hum(record: Record, axis: str) -> Record:

@@ -117,10 +117,14 @@ def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
 
 
 def _of_fit(fit: AxisFit) -> Iterator[Finding]:
-    """Yield what a user should know of the records and of the fit before trusting the model."""
+    """Yield what a user should know of the records and of the fit before trusting the model.
+
+    A tone smaller than the error of the model may be a part of that error, and is not told.
+    """
     for record, tones in zip(fit.records, fit.tone_amplitudes(), strict=True):
-        if tones:
-            yield Hum(record.name, tones)
+        error = fit.discrepancy * record.motion
+        if large := tuple((tone, size) for tone, size in tones if size > error):
+            yield Hum(record.name, large)
         if not record.rested:
             yield UnknownStart(record.name, record.first * record.period)
     if not fit.converged:
