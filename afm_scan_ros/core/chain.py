@@ -1,7 +1,7 @@
 """The model of one axis as a chain of elements from drive to displacement.
 
-    drive u (V) → [drive elements] → hysteresis → F (V) → vibration → creep
-                → + what the other axis adds → [output elements] → m
+    drive u (V) → [drive elements] → hysteresis → F (V) → vibration (→ the sensor's low-pass)
+                → creep → + what the other axis adds → [output elements] → m
 
 See scanner.py for what the axes add to each other.
 """
@@ -120,7 +120,7 @@ class Chain:
         """Return the model's stages: hysteresis, vibration, creep, output."""
         return (
             Stage((*self.drive, self.hysteresis_of(self.model.hysteresis.forward), *self._map)),
-            Stage((Element(Vibration, (self.model.vibration,)),)),
+            Stage((Element(Vibration, (self.model.read_vibration,)),)),
             Stage((Element(Creep, (self.model.creep,)),)),
             Stage(self.output, self.coupling),
         )

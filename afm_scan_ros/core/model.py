@@ -25,6 +25,7 @@ from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, Weight
+from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES, floats
@@ -255,6 +256,13 @@ class AxisModel:
     """The same on other records, of other amplitudes or bands; these may have been fitted."""
     effects: BaseEffects = field(default=BaseEffects(), eq=False)
     """How each base effect is known, and where it holds."""
+    sensor: SensorModel | None = None
+    """Low-pass through which the displacement is read: predicted, and never inverted."""
+
+    @property
+    def read_vibration(self) -> VibrationModel:
+        """The vibration as the sensor reads it."""
+        return self.vibration if self.sensor is None else self.sensor.read(self.vibration)
 
     @property
     def model_discrepancies(self) -> tuple[ModelDiscrepancy, ...]:

@@ -26,6 +26,7 @@ from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.scale import Scale, scale_of
+from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import (
@@ -180,6 +181,12 @@ NANOMETRES = {"suffix": "_nm", "scale": 1e-9}
 
 
 @frozen
+class _Sensor:
+    order: int
+    corner: float = field(metadata={"suffix": "_hz"})
+
+
+@frozen
 class _ModelDiscrepancy:
     record: str
     bands: tuple[float, ...] = field(metadata={"suffix": "_hz"})
@@ -219,6 +226,7 @@ class _Axis:
     added: tuple[AddedEffect, ...] = ()
     known_elsewhere: tuple[_ModelDiscrepancy, ...] = ()
     effects: _Effects | None = None
+    sensor: _Sensor | None = None
 
 
 @frozen
@@ -307,6 +315,7 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
         (),
         tuple(recast(ModelDiscrepancy, each) for each in axis.known_elsewhere),
         BaseEffects(*(recast(EffectStatus, part) for part in parts)),
+        None if axis.sensor is None else recast(SensorModel, axis.sensor),
     )
     model = evolve(model, added=added_from(axis.added, scale_of(model)))
     chain_of(model)  # raises where added effects cannot stand beside each other
@@ -355,6 +364,7 @@ def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
         added_to(axis.added),
         tuple(recast(_ModelDiscrepancy, each) for each in axis.known_elsewhere),
         _Effects(*(recast(_Effect, status) for _, status in axis.effects.each())),
+        None if axis.sensor is None else recast(_Sensor, axis.sensor),
     )
 
 

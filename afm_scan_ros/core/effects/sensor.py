@@ -1,0 +1,55 @@
+"""The sensor's own low-pass: what is read of the displacement, and no part of the motion.
+
+A Butterworth filter of an even order n and a corner ω_c has poles on a circle of that radius,
+
+    M(s) = Π_k 1 / (1 - s / p_k),    p_k = ω_c exp(jπ/2 + jπ (2k - 1) / (2n)),    k = 1 … n.
+
+It is part of what a model predicts a sensor to read, and is never inverted. Source: S. Butterworth,
+Experimental Wireless and the Wireless Engineer 7 (1930) 536.
+"""
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.errors import InputError
+
+
+@frozen
+class SensorModel:
+    """A low-pass of an even ``order`` and a ``corner`` (Hz).
+
+    Raises InputError where the order is odd, or either is not positive.
+    """
+
+    order: int = field(converter=int)
+    corner: float = field(converter=float)
+
+    def __attrs_post_init__(self) -> None:
+        if self.order < 2 or self.order % 2 or not self.corner > 0.0:  # noqa: PLR2004 - a pair
+            raise InputError(
+                f"the sensor's low-pass has order {self.order} and corner {self.corner:g} Hz: give"
+                " an even order and a positive corner"
+            )
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles above the real axis (rad/s), shape (order / 2,)."""
+        turns = 0.5 + (2.0 * np.arange(1, self.order // 2 + 1) - 1.0) / (2.0 * self.order)
+        return np.asarray(2.0 * np.pi * self.corner * np.exp(1j * np.pi * turns))
+
+    @property
+    def weights(self) -> NDArray[np.complex128]:
+        """Weights κ of these poles, with M(s) = Σ Re κ / (1 - s / p), same shape."""
+        every = np.concatenate([self.poles, self.poles.conj()])
+        others = [np.delete(every, k) for k in range(len(self.poles))]
+        each = [1.0 / np.prod(1.0 - p / o) for p, o in zip(self.poles, others, strict=True)]
+        return np.asarray(2.0 * np.array(each, complex), np.complex128)
+
+    def read(self, vibration: VibrationModel) -> VibrationModel:
+        """Return a vibration as it is read by the sensor."""
+        poles = np.concatenate([self.poles, self.poles.conj()])
+        low_pass = np.poly(poles).real / np.prod(-poles).real
+        denominator = np.polymul(vibration.denominator, low_pass)
+        return VibrationModel(vibration.numerator, tuple(denominator), vibration.delay)
