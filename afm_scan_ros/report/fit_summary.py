@@ -141,13 +141,11 @@ def _(one: found.ResponseMisfit) -> str:
 
 
 @finding_text.register
-def _(one: found.UnknownStart) -> str:
-    effect = "was taken for that after long motion"
-    if one.seconds:
-        effect = f"is unknown, so its first {one.seconds:.3g} s were not fitted"
+def _(one: found.SensorLowPass) -> str:
     return (
-        f"The hysteresis' state at the start of {one.record} {effect}. Depolarise the scanner"
-        " before a record, and state that."
+        f"The displacement is read through a low-pass of order {one.order} at {one.corner:.4g} Hz,"
+        " as of a sensor's electronics. The model predicts what is read, and its inverse leaves the"
+        " low-pass alone: in motion the scanner is ahead of what the sensor shows."
     )
 
 

@@ -1,18 +1,21 @@
 """The records of one axis → its fit: the order in which parameters are released."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.descent import VIBRATION, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
-from afm_scan_ros.core.fit.modes import FoundMode, best_mode, clear, large
+from afm_scan_ros.core.fit.modes import FoundMode, first_mode, further_mode
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
+from afm_scan_ros.core.fit.sensitivity import at_rest
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import averaged, correlation_length, in_step, signals_of
 from afm_scan_ros.core.record import Record
@@ -53,11 +56,6 @@ def fit_axis(
         Where the fit diverges.
     """
     fit = started(records, axis, settings)
-    for record in fit.records:
-        if record.first:
-            progress(
-                f"{record.name}: its memory is known from {record.first * record.period:.3g} s"
-            )
     fit.weigh()
     progress("looking for modes")
     if found := _first_mode(fit):
@@ -87,41 +85,76 @@ def fit_axis(
 def _fit_plays(fit: AxisFit) -> None:
     """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last."""
     settings = fit.layout.settings
-    by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep")
+    by_plays = (*fit.layout.operator.parts, *VIBRATION, "creep", "memory")
     settle(fit, settings.stage_steps, by_plays)
     fit.find_tones()
     while _add_mode(fit):
-        settle(fit, settings.most_steps, VIBRATION)
         settle(fit, settings.stage_steps, by_plays)
         fit.find_tones()
     settle(fit, settings.stage_steps)
     fit.find_tones()
 
 
-def _better(plays: AxisFit, progress: ProgressCallback) -> AxisFit:
-    """Return the fit by plays, the paper's operator, or by one state where that is clearly better.
+def _better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return the fit by plays, the paper's operator, or by what has clearly the greater evidence.
 
-    Where plays leave hardly more than the sensor's noise, no other operator is tried.
-    The evidence is that of independent residuals, so the lead of one state is divided by their
-    correlation length, and has to be as clear as a mode's. One state that diverges is none of the
-    scanner's.
+    That is an operator of one state, a sensor with a low-pass of its own, or both. Nothing else is
+    tried where hardly more than the sensor's noise is left.
     """
-    if plays.sufficient:
-        progress("plays leave hardly more than noise")
-        return plays
+    fit = _with_any_sensor(fit, progress)
+    if fit.sufficient:
+        progress("hardly more than noise is left")
+        return fit
     progress("fitting the hysteresis by one state")
+    other = _preferred(fit, partial(with_one_state, fit), progress, "one state")
+    if other is fit:
+        return fit
+    while _add_mode(other):
+        settle(other, other.layout.settings.most_steps, searching=True)
+    return _with_any_sensor(other, progress)
+
+
+def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return a fit, or one with a low-pass of the sensor that has clearly the greater evidence.
+
+    A steeper one is tried where the last was better, and not enough.
+    """
+    for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
+        name = f"a sensor's low-pass of order {order}"
+        other = fit
+        if not fit.sufficient:
+            other = _preferred(fit, partial(with_sensor, fit, order), progress, name)
+        if other is fit:
+            break
+        fit = other
+    return fit
+
+
+def _preferred(
+    fit: AxisFit,
+    changed: Callable[[], AxisFit | None],
+    progress: ProgressCallback,
+    name: str,
+) -> AxisFit:
+    """Return a fit, or a changed one that has clearly the greater evidence.
+
+    The evidence is that of independent residuals, so the lead is divided by their correlation
+    length, and has to be as clear as a mode's. A fit that diverges is none of the scanner's.
+    """
     try:
-        other = with_one_state(plays)
-        lead = -_margin(plays, other)
+        other = changed()
+        if other is None:
+            return fit
+        lead = -_margin(fit, other)
         if lead > 0.0:
             settle(other, other.layout.settings.most_steps, searching=True)
-            lead = other.evidence() - plays.evidence()
+            lead = other.evidence() - fit.evidence()
     except ScanError as error:
-        progress(f"one state: {error}")
-        return plays
+        progress(f"{name}: {error}")
+        return fit
     lead /= max(map(correlation_length, other.residuals(other.simulated(other.theta))))
-    progress(f"one state has {lead:.3g} nat more evidence than plays")
-    return other if lead > other.layout.settings.mode_chance else plays
+    progress(f"{name} has {lead:.3g} nat more evidence")
+    return other if lead > other.layout.settings.mode_chance else fit
 
 
 def _margin(one: AxisFit, other: AxisFit) -> float:
@@ -159,8 +192,12 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
         )
         for record, drive in zip(given, drives, strict=True)
     ]
+    begun = [k for k, one in enumerate(signals) if not one.rested]
+    for place, k in enumerate(begun):
+        signals[k] = evolve(signals[k], unknown=place)
     longest = max(len(one.drive) * one.period for one in signals)
-    layout = layout_of(operator, longest, min(one.period for one in signals), settings)
+    shortest = min(one.period for one in signals)
+    layout = evolve(layout_of(operator, longest, shortest, settings), unknown_starts=len(begun))
     driven = np.concatenate([one.drive - one.drive.mean() for one in signals])
     moved = np.concatenate([one.displacement - one.displacement.mean() for one in signals])
     gain = float(driven @ moved / (driven @ driven))
@@ -177,18 +214,22 @@ def _range_of(drives: Sequence[Array], settings: FitSettings) -> tuple[float, fl
 
 def _first_mode(fit: AxisFit) -> FoundMode | None:
     """Add the mode of the largest residuals, where they are about it rather than of the loops."""
-    found = best_mode(fit, large)
-    if found is None or found.share < fit.layout.settings.dominant_share:
-        return None
-    _add(fit, found)
+    found = first_mode(fit)
+    if found is not None:
+        _add(fit, found)
     return found
 
 
 def _add_mode(fit: AxisFit) -> bool:
-    """Add the mode that is seen most clearly, where there is one and room for it."""
-    settings = fit.layout.settings
-    found = best_mode(fit, clear) if fit.layout.modes < settings.most_modes else None
-    if found is None or found.share < settings.mode_share:
+    """Add the mode that explains most, where there is one and room for it.
+
+    Once there is a mode, none is sought where hardly more than noise is left.
+    """
+    enough = fit.layout.modes > 0 and fit.sufficient
+    if enough or fit.layout.modes == fit.layout.settings.most_modes:
+        return False
+    found = further_mode(fit)
+    if found is None:
         return False
     _add(fit, found)
     return True
@@ -200,8 +241,36 @@ def _add(fit: AxisFit, found: FoundMode) -> None:
         longest = max(len(one.drive) * one.period for one in fit.records)
         shortest = min(one.period for one in fit.records)
         settings, omega = fit.layout.settings, found.mode[0]
-        fit.lay_out(layout_of(fit.layout.operator, longest, shortest, settings, omega))
+        laid = layout_of(fit.layout.operator, longest, shortest, settings, omega)
+        now = fit.layout
+        fit.lay_out(evolve(laid, unknown_starts=now.unknown_starts, sensor_order=now.sensor_order))
     fit.add(found.mode)
+
+
+def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
+    """Return the fit with a sensor's low-pass that lags as much as its vibration does.
+
+    What vibrates is sought anew. Returns None where nothing lags, or where the low-pass explains
+    hardly anything of what is left while the operator is held.
+    """
+    dynamics, settings = fit.layout.dynamics(fit.theta), fit.layout.settings
+    lag = -float(np.sum((dynamics.weights / dynamics.poles).real))
+    unit = SensorModel(order, 1.0)
+    corner = -float(np.sum((unit.weights / unit.poles).real)) / max(lag, np.finfo(float).tiny)
+    if corner > 0.5 / min(one.period for one in fit.records):
+        return None
+    laid = evolve(fit.layout, modes=0, sensor_order=order)
+    other = AxisFit(laid, list(fit.records), fit.gain, laid.start(), fit.discrepancy)
+    for name in (*fit.layout.operator.parts, "map", "creep", "memory"):
+        other.theta[laid.parts[name]] = fit.theta[fit.layout.parts[name]]
+    other.theta[laid.parts["sensor"]] = np.log(corner)
+    other.weigh()
+    for _ in range(1 + max(fit.layout.modes, 1)):
+        settle(other, settings.stage_steps, (*VIBRATION, "creep"))
+        if not _add_mode(other):
+            break
+    left = (other.discrepancy / fit.discrepancy) ** 2
+    return other if left < 1.0 - settings.mode_share else None
 
 
 def with_one_state(fit: AxisFit) -> AxisFit:
@@ -209,9 +278,9 @@ def with_one_state(fit: AxisFit) -> AxisFit:
 
     What vibrates is sought anew: it may have taken what plays cannot do.
     """
-    layout, paths = fit.layout, []
+    layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
     for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
-        output = simulation.effective - simulation.settled
+        output = simulation.effective - rest
         paths.append((averaged(record.drive, record.block), averaged(output, record.block)))
     low = min(float((output - drive).min()) for drive, output in paths)
     high = max(float((output - drive).max()) for drive, output in paths)
@@ -220,8 +289,10 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     )
     widths = low - margin, high + margin
     operator = OneState(layout.operator.lower, layout.operator.upper, widths, layout.settings)
-    linear = fit.theta[layout.parts["lags"].start :]
-    starts = [np.concatenate([one, linear]) for one in operator.started(paths)]
+    linear = fit.theta[layout.parts["lags"].start : layout.parts["memory"].start]
+    begun = np.array([output[0] - drive[0] for drive, output in paths])
+    memory = begun[[one.unknown is not None for one in fit.records]]
+    starts = [np.concatenate([one, linear, memory]) for one in operator.started(paths)]
     other = AxisFit(
         evolve(layout, operator=operator), list(fit.records), fit.gain, starts[0], fit.discrepancy
     )

@@ -24,8 +24,8 @@ from afm_scan_ros.core.types import Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
-VIBRATION = ("lags", "modes")
-"""Groups of parameters of V, which can be fitted while the operator is held."""
+VIBRATION = ("lags", "modes", "sensor")
+"""Groups of parameters of V and M, which can be fitted while the operator is held."""
 
 
 def settle(
@@ -54,11 +54,15 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     Where ``searching``, the scales of the greatest evidence are chosen first, if the last step
     showed the objective to be as quadratic as that evidence takes it to be, or had converged. A
     parameter that would fall below its lowest value stays there for this step, and so does a map
-    behind the operator that would turn back on every step.
+    behind the operator that would turn back on every step. What records remember bends the
+    objective at every play that moves, so until it is nearly quadratic it is moved on its own.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in groups or fit.layout.parts:
         free[fit.layout.parts[name]] = True
+    memory = fit.layout.parts["memory"]
+    alone = free[memory].any() and not (fit.quadratic or fit.converged)
+    free[memory] &= not alone
     held = not free[: fit.layout.parts["map"].stop].any()
     matrix, right = fit.normal(with_operator=not held)
     if searching and (fit.quadratic or fit.converged):
@@ -73,6 +77,23 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     if fell == 0.0 and free[mapped].any():
         free[mapped], fit.damping = False, damping
         fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
+    return fell + _recall(fit) if alone else fell
+
+
+def _recall(fit: AxisFit) -> float:
+    """Move what records remember while all else is held; return how far the objective fell."""
+    free = np.zeros(fit.layout.size, bool)
+    free[fit.layout.parts["memory"]] = True
+    matrix, right = fit.normal(with_operator=False)
+    precision, mean = fit.layout.prior(fit.scales, fit.theta)
+    whole = fit.layout.conditioned(matrix + precision)
+    right -= precision @ (fit.theta - mean)
+    kept = fit.damping, fit.remaining, fit.quadratic
+    fit.damping, fit.quadratic = fit.damping_alone, True
+    metric = np.diag(np.diag(whole))
+    fell = _descend(fit, _Equations(whole, right, free, held=True, metric=metric))
+    fit.damping_alone = fit.damping
+    fit.damping, fit.remaining, fit.quadratic = kept
     return fell
 
 

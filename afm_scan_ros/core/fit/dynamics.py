@@ -1,9 +1,10 @@
-"""The linear part of an axis: vibration as a bank of poles, then creep.
+"""The linear part of an axis: vibration as a bank of poles, then creep, then the sensor.
 
     V(s) = Σ_i Re κ_i / (1 - s / p_i),    C(s) = 1 + Σ_j g_j / (1 + s τ_j)
 
-A pole of a mode is complex, that of a lag real. The input is held between samples, and a sample is
-taken just before the update of the input, so that displacement k depends on inputs up to k - 1:
+A pole of a mode is complex, that of a lag real. The sensor M(s) is a low-pass of complex poles. The
+input is held between samples, and a sample is taken just before the update of the input, so that
+displacement k depends on inputs up to k - 1:
 
     x_i[k + 1] = z_i x_i[k] + (1 - z_i) v[k],    z_i = exp(p_i T),    y[k] = Σ Re κ_i x_i[k]
 """
@@ -11,7 +12,7 @@ taken just before the update of the input, so that displacement k depends on inp
 from functools import cached_property
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.compiled import compiled
@@ -24,34 +25,69 @@ Complex = NDArray[np.complex128]
 
 @frozen(eq=False)
 class PoleBank:
-    """Poles (rad/s) with weights κ of unit sum, the complex ones first; creep's gains and τ (s)."""
+    """Poles (rad/s) with weights κ of unit sum, the complex ones first; creep's gains and τ (s).
+
+    The ``sensor`` has poles and weights as V has, all complex.
+    """
 
     poles: Complex
     weights: Complex
     gains: Array
     time_constants: Array
+    sensor: tuple[Complex, Complex]
 
     @cached_property
     def modes(self) -> int:
         """Number of complex poles."""
         return int(np.count_nonzero(self.poles.imag))
 
+    def read(self) -> "PoleBank":
+        """V(s) M(s) in the place of V(s), its own complex poles first."""
+        poles, weights = _product((self.poles, self.weights), self.sensor)
+        own = np.arange(len(self.poles))
+        order = np.concatenate(
+            [own[: self.modes], np.arange(len(poles))[len(own) :], own[self.modes :]]
+        )
+        none = np.zeros(0, complex)
+        return evolve(self, poles=poles[order], weights=weights[order], sensor=(none, none))
+
     def parallel(self) -> tuple[Complex, Complex]:
-        """Poles and weights of V(s) C(s) as one bank."""
-        slow = -1.0 / self.time_constants
-        both = np.concatenate([self.poles, slow])
-        fast = self.weights * self._creep(self.poles)
-        late = self.gains * self._vibration(slow.astype(complex))
-        return both, np.concatenate([fast, late])
+        """Poles and weights of V(s) C(s) M(s) as one bank."""
+        whole = self.read()
+        slow = (-1.0 / self.time_constants).astype(complex)
+        late = self.gains * _at((whole.poles, whole.weights), slow)
+        fast = whole.weights * self._creep(whole.poles)
+        return np.concatenate([whole.poles, slow]), np.concatenate([fast, late])
+
+    def seen(self, response: "Response") -> tuple[Complex, Complex, Array]:
+        """States of V's poles as the sensor reads them: ``Response.modes, changes, lags`` of M x_i.
+
+        Of a pole p, with the poles q of M and their weights κ,
+
+            M(s) / (1 - s / p) = M(p) / (1 - s / p) + Σ_q Re_q κ / (1 - q / p) / (1 - s / q),
+
+        where Re_q is half the sum of a term and of that with q and κ conjugate.
+        """
+        if not len(self.sensor[0]):
+            return response.modes, response.changes, response.lags
+        states, count = response.modes[:, self.modes :], self.modes
+        x = np.concatenate([response.modes[:, :count], response.lags], axis=1)
+        d = np.concatenate([response.changes[:, :count], np.zeros_like(response.lags)], axis=1)
+        p = self.poles[:, np.newaxis]
+        seen, changes = x * _at(self.sensor, self.poles), d * _at(self.sensor, self.poles)
+        for q, weight, state in (
+            (*self.sensor, states),
+            (*(one.conj() for one in self.sensor), states.conj()),
+        ):
+            apart = 1.0 - q / p
+            seen += 0.5 * state @ (weight / apart).T
+            changes -= 0.5 * state @ (weight * q / (p * apart) ** 2).T
+            changes += 0.5 * x * (weight / q / (1.0 - p / q) ** 2).sum(axis=1)
+        return seen[:, :count], changes[:, :count], seen[:, count:].real
 
     def _creep(self, s: Complex) -> Complex:
         late = self.gains / (1.0 + s[:, np.newaxis] * self.time_constants)
         return np.asarray(1.0 + late.sum(axis=1))
-
-    def _vibration(self, s: Complex) -> Complex:
-        one = self.weights / (1.0 - s[:, np.newaxis] / self.poles)
-        two = self.weights.conj() / (1.0 - s[:, np.newaxis] / self.poles.conj())
-        return np.asarray(0.5 * (one + two).sum(axis=1))
 
     def vibration(self, gain: float) -> VibrationModel:
         """V(s) times a gain (m/V) as polynomials of s."""
@@ -74,6 +110,24 @@ class PoleBank:
         return CreepModel(tuple(self.gains[some]), tuple(self.time_constants[some]))
 
 
+def _at(bank: tuple[Complex, Complex], s: Complex) -> Complex:
+    """Response of a bank at some s (rad/s), (n,)."""
+    poles, weights = bank
+    one = weights / (1.0 - s[:, np.newaxis] / poles)
+    two = weights.conj() / (1.0 - s[:, np.newaxis] / poles.conj())
+    return np.asarray(0.5 * (one + two).sum(axis=1))
+
+
+def _product(
+    one: tuple[Complex, Complex], other: tuple[Complex, Complex]
+) -> tuple[Complex, Complex]:
+    """Poles and weights of the product of two banks; one of no poles lets all pass."""
+    if not len(other[0]):
+        return one
+    weights = np.concatenate([one[1] * _at(other, one[0]), other[1] * _at(one, other[0])])
+    return np.concatenate([one[0], other[0]]), weights
+
+
 @frozen(eq=False)
 class Response:
     """Means over blocks of y, shape (blocks,), and of what its derivatives are made of.
@@ -94,6 +148,7 @@ def respond(
     dynamics: PoleBank, period: float, inputs: Array, block: int, settled: float
 ) -> Response:
     """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
+    dynamics = dynamics.read()
     z, count = np.exp(dynamics.poles * period), dynamics.modes
     slow = np.exp(-period / dynamics.time_constants)
     modes = z[:count], dynamics.weights[:count]

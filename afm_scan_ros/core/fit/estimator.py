@@ -59,6 +59,7 @@ class AxisFit:
     may still fall: what the last step left of what it would have brought, were the objective
     quadratic. ``quadratic`` is whether it nearly was. The gain stays as the first mode leaves it,
     for the operator has one. Where it ``grows``, slopes of plays are held to their least value.
+    ``damping_alone`` is that of steps of the memories alone.
     """
 
     layout: Layout
@@ -71,7 +72,8 @@ class AxisFit:
     quadratic: bool = False
     grows: bool = False
     damping: float = field()
-    _columns: dict[int, list[Columns]] = field(factory=dict)
+    damping_alone: float = 1.0
+    _columns: dict[int, tuple[Array | None, list[Columns]]] = field(factory=dict)
     _regressors: dict[int, tuple[object, Array, Array]] = field(factory=dict)
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
@@ -273,10 +275,11 @@ class AxisFit:
         self.layout, self.theta = self.layout.with_mode(self.theta, mode)
 
     def lay_out(self, layout: Layout) -> None:
-        """Take another layout: the operator stays, the linear part begins anew."""
-        operator = self.theta[: self.layout.parts["map"].stop]
+        """Take another layout: operator, sensor and memories stay, the linear part begins anew."""
+        before, theta = self.layout.parts, self.theta
         self.layout, self.theta = layout, layout.start()
-        self.theta[: len(operator)] = operator
+        for name in (*layout.operator.parts, "map", "sensor", "memory"):
+            self.theta[layout.parts[name]] = theta[before[name]]
 
     def _free(self, k: int) -> _Free:
         """What is free in a record; its regressors are kept while they stay the same."""
@@ -288,17 +291,23 @@ class AxisFit:
         return _Free(*self._regressors[k][1:], self.variance(record))
 
     def _pieces_of(self, k: int) -> Iterable[Columns]:
-        """∂A/∂(operator) in a record; those of a linear operator are kept."""
+        """∂A/∂(operator) in a record; those of a linear operator are kept.
+
+        They are made anew where what the record remembers has moved by half of what plays resolve.
+        """
         operator, record = self.layout.operator, self.records[k]
-        if k in self._columns:
-            return self._columns[k]
         theta = self.layout.of_operator(self.theta)
-        pieces: Iterable[Columns] = operator.pieces(
-            theta, record.drive, record.block, rested=record.rested
-        )
-        if operator.linear:
-            pieces = self._columns[k] = list(pieces)
-        return pieces
+        memory = self.layout.memory_of(self.theta, record)
+        if k in self._columns:
+            kept, pieces = self._columns[k]
+            near = 0.5 * self.layout.settings.play_step * operator.half
+            if memory is None or kept is None or np.abs(memory - kept).max() < near:
+                return pieces
+        made = operator.pieces(theta, record.drive, record.block, memory)
+        if not operator.linear:
+            return made
+        self._columns[k] = memory, list(made)
+        return self._columns[k][1]
 
 
 def _finite(values: Array) -> Array:

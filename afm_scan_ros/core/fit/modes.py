@@ -1,206 +1,158 @@
-"""The mode that a fit lacks: a resonance in its residuals where a smooth response leaves one.
+"""The mode that a fit lacks: the resonance that would lower its objective most.
 
-About each frequency the spectrum E of the residuals is fitted twice by the spectrum F of what
-drives V: by a smooth response, and by one with a mode of pole p,
+A mode of pole p is tried with a weight κ of zero, about which the fit is linear. Were all other
+parameters θ fitted anew with it, the objective would fall by
 
-    E(ω) = (b_0 + jω b_1 + κ_r H_r(ω) + κ_i H_i(ω)) F(ω),    H_r + j H_i = (1 - z) / (exp(jωT) - z),
+    ½ gᵀ κ,    κ = S⁻¹ g,    S = H_κκ - H_κθ H_θθ⁻¹ H_θκ,    g = b_κ - H_κθ H_θθ⁻¹ b_θ,
 
-with z = exp(pT). What both leave over a narrow band does not depend on how large the residuals are
-elsewhere, where the hysteresis may not have been fitted yet.
+with the normal equations' H and b. So neither plays nor lags hide a resonance by an imitation of
+it. This is Rao's score test. Source: C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterator, Sequence
+from copy import copy
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.linalg import cho_factor, cho_solve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import Mode
-from afm_scan_ros.core.fit.settings import FitSettings
-from afm_scan_ros.core.fit.signals import averaged
 from afm_scan_ros.core.types import Array
 
 
 @frozen
 class FoundMode:
-    """A mode, what it explains, and the static gain with it over that before.
-
-    ``chance`` (nat) is its gain in likelihood, ``share`` that of the residuals about it which it
-    explains beside a smooth response, ``misfit`` (nat) how much those residuals are of all.
-    """
+    """A mode, by how much (nat) it lowers the objective, and the static gain over that before."""
 
     mode: Mode
     chance: float
-    share: float
-    misfit: float
     gain: float
 
 
-Weight: TypeAlias = Callable[[FoundMode], float]
-"""What a search maximises."""
+Place = tuple[float, float]
+"""Angular frequency (rad/s) and damping."""
 
 
-def clear(found: FoundMode) -> float:
-    """Weigh a mode by how clearly it is seen: it explains much, and most of what there is."""
-    return found.chance * found.share
+def first_mode(fit: AxisFit) -> FoundMode | None:
+    """Return the mode that explains most of what a straight line leaves, None where it is little.
 
-
-def large(found: FoundMode) -> float:
-    """Weigh a mode by how much of all residuals it explains."""
-    return found.misfit * found.share
-
-
-class _Spectrum(NamedTuple):
-    """Spectra of a record over the angular frequency (rad/s), all (n,).
-
-    ``period`` (s) is its sample period, ``variance`` (m²) that of a line which the fit expects.
+    Then the residuals are about a resonance rather than of the loops of the hysteresis. The static
+    gain is free beside it, for a straight line through such a motion has another.
     """
-
-    omega: NDArray[np.float64]
-    driven: NDArray[np.complex128]
-    left: NDArray[np.complex128]
-    period: float
-    variance: float
+    free = np.zeros(fit.layout.size, bool)
+    for name in ("lags", "creep"):
+        free[fit.layout.parts[name]] = True
+    return _best(fit, free, fit.layout.settings.dominant_share * fit.misfit(fit.theta))
 
 
-def best_mode(fit: AxisFit, weight: Weight) -> FoundMode | None:
-    """Return the mode of the greatest weight in the residuals, None where they show none.
+def further_mode(fit: AxisFit) -> FoundMode | None:
+    """Return the mode that explains most beside all that is fitted, None where it is little.
 
-    The search goes over all frequencies that the records resolve, in steps of a half-power
-    bandwidth, and on from each peak. What is slower than the lags of the modes is creep.
+    It is to be of possible weight, and to explain a share of what is left about its frequency, of
+    so many lines that chance does not: a resonance of any frequency explains a single one.
     """
-    settings, spectra = fit.layout.settings, list(_spectra(fit))
-    lowest = min(settings.tone_cycles * one.omega[1] for one in spectra)
+    settings = fit.layout.settings
+    found = _best(fit, np.ones(fit.layout.size, bool), settings.mode_chance)
+    if found is None or np.hypot(*found.mode[2:]) > settings.heaviest_mode:
+        return None
+    misfit, lines = _left_about(fit, found.mode[0])
+    share = min(found.chance / misfit, 1.0 - settings.tone_chance)
+    seen = -lines * np.log1p(-share) > settings.mode_chance
+    return found if seen and share > settings.mode_share else None
+
+
+def _best(fit: AxisFit, free: NDArray[np.bool_], enough: float) -> FoundMode | None:
+    """Search all frequencies that the records resolve, and then about the best one.
+
+    What is explained best by the greatest damping is a bend of the response, and no mode.
+    """
+    settings, pitch = fit.layout.settings, 2.0 * fit.layout.settings.tried_damping
+    lowest, highest = _band(fit)
+    count = int(np.log(highest / lowest) / pitch) if highest > lowest else 0
+    grid = [(omega, settings.tried_damping) for omega in np.geomspace(lowest, highest, count + 1)]
+    found = max(_tried(fit, grid, free), key=_chance, default=None)
+    if found is None or found.chance < settings.near_chance * enough:
+        return None
+    dampings = np.geomspace(settings.damping / 4.0, settings.greatest_damping, 5)
+    found = max(found, *_tried(fit, _about(found, pitch, dampings), free), key=_chance)
+    if found.mode[1] == dampings[-1] or found.chance < enough:
+        return None
+    nearer = found.mode[1] * np.geomspace(0.5, 2.0, 5)
+    return max(found, *_tried(fit, _about(found, 0.25 * pitch, nearer), free), key=_chance)
+
+
+def _about(found: FoundMode, width: float, dampings: Array) -> list[Place]:
+    """Places about a mode, within a ``width`` of the logarithm of its frequency."""
+    near = found.mode[0] * np.exp(width * np.linspace(-1.0, 1.0, 9))
+    return [(float(omega), float(damping)) for omega in near for damping in dampings]
+
+
+def _chance(found: FoundMode) -> float:
+    return found.chance
+
+
+def _band(fit: AxisFit) -> tuple[float, float]:
+    """Lowest and highest angular frequency (rad/s) of a mode: what is slower than lags is creep."""
+    settings = fit.layout.settings
+    lengths = [one.length * len(one.mean) for one in fit.records]
+    lowest = 2.0 * np.pi * settings.tone_cycles / max(lengths)
     if fit.layout.modes:
         first = min(omega for omega, *_ in fit.layout.of_modes(fit.theta))
         lowest = max(lowest, first / settings.slowest_lag)
-    highest = max(one.omega[-1] for one in spectra)
-    pitch = 2.0 * settings.damping
-    grid = np.exp(np.arange(np.log(lowest), np.log(highest), pitch))
-    found = [_about(spectra, omega, settings.damping, settings) for omega in grid]
-    near = max(int(settings.mode_band / pitch), 1)
-    peaks = (
-        one
-        for k, one in enumerate(found)
-        if one is not None and one is _first(found[max(k - near, 0) : k + near + 1], weight)
-    )
-    refined = (_refined(spectra, one, settings, weight) for one in peaks)
-    return _first([one for one in refined if _is_mode(one, settings)], weight)
+    return lowest, 0.8 * np.pi / min(one.length for one in fit.records)
 
 
-def _first(found: Iterable[FoundMode | None], weight: Weight) -> FoundMode | None:
-    return max((one for one in found if one is not None), key=weight, default=None)
+def _tried(fit: AxisFit, places: Sequence[Place], free: NDArray[np.bool_]) -> Iterator[FoundMode]:
+    """Yield what each mode explains, the ``free`` parameters (size,) of the fit being fitted.
 
-
-def _is_mode(found: FoundMode, settings: FitSettings) -> bool:
-    """Whether a mode is as sharp as those of stages, of possible weight, and seen beyond chance.
-
-    What it explains is to count among its neighbours as well as in the whole fit.
+    So many are tried at a time as memory holds derivatives of.
     """
-    _, damping, real, imag = found.mode
-    possible = damping < settings.greatest_damping and np.hypot(real, imag) < settings.heaviest_mode
-    seen = min(found.chance, 0.5 * found.misfit * found.share) > settings.mode_chance
-    return bool(possible and seen)
+    blocks, settings = max(one.blocks for one in fit.records), fit.layout.settings
+    at_once = min(settings.modes_at_once, max(settings.mode_values // blocks, 1))
+    for first in range(0, len(places), at_once):
+        yield from _tried_at_once(fit, places[first : first + at_once], free)
 
 
-def _spectra(fit: AxisFit) -> Iterator[_Spectrum]:
-    """Spectra of what drives V and of the residuals, over frequencies that blocks resolve."""
-    simulations = fit.simulated(fit.theta)
-    pairs = zip(simulations, fit.residuals(simulations), strict=True)
-    for record, (simulation, left) in zip(fit.records, pairs, strict=True):
-        driven = fit.gain * averaged(simulation.effective, record.block)[record.used]
-        window, omega = np.hanning(len(left)), np.fft.rfftfreq(len(left), record.length)
-        count = int(0.8 * len(omega))
-        variance = fit.variance(record) * float(window @ window)
-        driving, residual = (np.fft.rfft(window * (one - one.mean())) for one in (driven, left))
-        at = 2.0 * np.pi * omega[:count].astype(np.float64)
-        yield _Spectrum(at, driving[:count], residual[:count], record.period, variance)
+def _tried_at_once(
+    fit: AxisFit, places: Sequence[Place], free: NDArray[np.bool_]
+) -> Iterator[FoundMode]:
+    wider, layout, last = copy(fit), fit.layout, fit.layout.parts["modes"].stop
+    for omega, damping in places:
+        wider.add((omega, damping, 0.0, 0.0))
+    matrix, right = wider.normal(with_operator=bool(free[0]))
+    precision, mean = wider.layout.prior(fit.scales, wider.theta)
+    right -= precision @ (wider.theta - mean)
+    if not free[0]:
+        precision = wider.layout.of_any_gain(precision)
+    whole = wider.layout.conditioned(matrix + precision)
+    behind = np.arange(last, layout.size) + 4 * len(places)
+    kept = np.concatenate([np.arange(last), behind])[free]
+    factor = cho_factor(whole[np.ix_(kept, kept)])
+    alone, static = cho_solve(factor, right[kept]), layout.static[free]
+    for k, (omega, damping) in enumerate(places):
+        weights = last + 4 * k + np.array([2, 3])
+        shared = whole[np.ix_(kept, weights)]
+        along = cho_solve(factor, shared)
+        pull = right[weights] - shared.T @ alone
+        pair = np.linalg.solve(whole[np.ix_(weights, weights)] - shared.T @ along, pull)
+        gain = 1.0 if free[0] else float(1.0 + pair[0] + static @ (alone - along @ pair))
+        mode = omega, damping, float(pair[0]) / gain, float(pair[1]) / gain
+        yield FoundMode(mode, 0.5 * float(pull @ pair), gain)
 
 
-def _about(
-    spectra: Sequence[_Spectrum], omega: float, damping: float, settings: FitSettings
-) -> FoundMode | None:
-    """Fit a mode within a band about it, None where no record has lines enough there.
+def _left_about(fit: AxisFit, omega: float) -> tuple[float, float]:
+    """What is left (nat) in a band about an angular frequency (rad/s), and of how many lines.
 
-    Each record counts as many lines as hold most of its power there, as sharp lines of a periodic
-    drive tell no more than they are.
+    A line counts by its share of the power, as the sharp ones of a periodic drive do not tell more
+    than they are.
     """
-    if not 0.0 < damping < 1.0:
-        return None
-    bands = [one for each in spectra if (one := _band(each, omega, damping, settings)) is not None]
-    if not bands:
-        return None
-    matrix, right = (
-        np.sum([getattr(one, name) for one in bands], axis=0) for name in ("matrix", "right")
-    )
-    matrix += np.finfo(float).eps * np.trace(matrix) * np.eye(4)
-    weights = np.linalg.solve(matrix, right)
-    smooth = np.append(np.linalg.solve(matrix[:2, :2], right[:2]), [0.0, 0.0])
-    least = np.finfo(float).eps
-    before, after = (
-        np.array([max(one.left_by(each), least * one.lines) for one in bands])
-        for each in (smooth, weights)
-    )
-    lines, misfits = np.array([(one.lines, one.misfit) for one in bands]).T
-    share = 1.0 - float(misfits @ (after / lines)) / float(misfits @ (before / lines))
-    chance = float(lines @ np.log(before / after))
-    shift, _, real, imag = weights
-    gain = float(1.0 + shift + real)
-    mode = omega, damping, float(real) / gain, float(imag) / gain
-    return FoundMode(mode, chance, share, float(misfits.sum()), gain)
-
-
-class _Band(NamedTuple):
-    """Normal equations of a record about a frequency, over the mean power of its ``lines`` there.
-
-    ``misfit`` (nat) is how much its residuals there are of all.
-    """
-
-    matrix: NDArray[np.float64]
-    right: NDArray[np.float64]
-    lines: float
-    misfit: float
-
-    def left_by(self, weights: Array) -> float:
-        """Power that weights (4,) leave, in lines."""
-        return float(self.lines - 2.0 * weights @ self.right + weights @ self.matrix @ weights)
-
-
-def _band(one: _Spectrum, omega: float, damping: float, settings: FitSettings) -> _Band | None:
-    """Weigh a smooth response and a mode within a band; None where a record has too few lines."""
-    edges = omega * (1.0 + settings.mode_band * np.array([-1.0, 1.0]))
-    band = slice(*np.searchsorted(one.omega, edges))
-    left, driven, at = one.left[band], one.driven[band], one.omega[band]
-    power = np.abs(left) ** 2
-    if len(at) < 4 or at[-1] < omega or not power.any() or not driven.any():  # noqa: PLR2004 - as many weights
-        return None
-    pole = omega * (-damping + 1j * np.sqrt(1.0 - damping**2))
-    z, turned = np.exp(pole * one.period), np.exp(1j * at * one.period)
-    rising, falling = (1.0 - z) / (turned - z), (1.0 - z.conj()) / (turned - z.conj())
-    shapes = (np.ones(len(at)), 1j * at / omega, rising + falling, 1j * (rising - falling))
-    columns = np.array([1.0, 1.0, 0.5, 0.5])[:, np.newaxis] * np.array(shapes) * driven
-    lines, total = power.sum() ** 2 / (power**2).sum(), power.sum()
-    matrix, right = (columns.conj() @ columns.T).real, (columns.conj() @ left).real
-    return _Band(lines / total * matrix, lines / total * right, lines, total / one.variance)
-
-
-def _refined(
-    spectra: Sequence[_Spectrum], found: FoundMode, settings: FitSettings, weight: Weight
-) -> FoundMode:
-    """Search about a mode for the frequency and the damping that explain most."""
-    omega, damping, *_ = found.mode
-    tried = [found]
-
-    def lost(move: Array) -> float:
-        sharper = damping * float(np.exp(-move[1]))
-        one = _about(spectra, omega * (1.0 + damping * float(move[0])), sharper, settings)
-        tried.extend([] if one is None else [one])
-        return np.inf if one is None else -weight(one)
-
-    corners = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, np.log(2.0)]])
-    options = {"maxfev": settings.mode_trials, "initial_simplex": corners}
-    minimize(lost, corners[0], method="Nelder-Mead", options=options)
-    return max(tried, key=weight)
+    misfit, lines, width = 0.0, 0.0, fit.layout.settings.mode_band
+    for record, left in zip(fit.records, fit.residuals(fit.simulated(fit.theta)), strict=True):
+        at = 2.0 * np.pi * np.fft.rfftfreq(len(left), record.length)
+        spectrum = np.fft.rfft(np.hanning(len(left)) * left)[np.abs(at - omega) < width * omega]
+        power = np.abs(spectrum) ** 2 / (0.375 * len(left) * fit.variance(record))
+        misfit += float(power.sum())
+        lines += float(power.sum() ** 2 / (power**2).sum()) if power.any() else 0.0
+    return misfit, lines

@@ -20,6 +20,7 @@ from afm_scan_ros.core.effects.hysteresis.branches import (
 )
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.signals import averaged
 from afm_scan_ros.core.types import Array
 
 
@@ -76,16 +77,31 @@ class OneState:
         bent = rough / scales["slopes"] ** 2 + np.eye(len(rough)) / self.settings.slopes**2
         return np.asarray(np.kron(np.eye(2), bent))
 
-    def output(self, theta: Array, drive: Array, *, rested: bool) -> Array:
-        """A (V) for a drive (V), both (n,)."""
-        now = np.array([0.0 if rested else drive[0], 0.0])
+    unknowns = 1
+
+    def expected_memory(self) -> Array:
+        """Standard deviation of w (V) at an unknown start: anywhere between both ``widths``."""
+        return np.array([(self.widths[1] - self.widths[0]) / np.sqrt(12.0)])
+
+    def output(self, theta: Array, drive: Array, memory: Array | None) -> Array:
+        """A (V) for a drive (V), both (n,), of a scanner in use from w = ``memory`` on, (1,)."""
+        now = _now(drive, memory)
         count = self.settings.slope_cells_drive
         line = np.ones(count + 3), np.linspace(self.lower, self.upper, count + 1)
         return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
 
-    def pieces(self, theta: Array, drive: Array, block: int, *, rested: bool) -> Iterator[Array]:
+    def remembered(self, theta: Array, drive: Array, block: int, memory: Array) -> Array:
+        """∂A/∂memory averaged over blocks, shape (blocks, 1), by a difference."""
+        apart = np.sqrt(np.finfo(float).eps) * self.half
+        ends = (self.output(theta, drive, memory + way * apart) for way in (1.0, -1.0))
+        up, down = (averaged(one, block) for one in ends)
+        return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))
+
+    def pieces(
+        self, theta: Array, drive: Array, block: int, memory: Array | None
+    ) -> Iterator[Array]:
         """Yield ∂A/∂theta averaged over blocks, in pieces of shape (blocks, parameters)."""
-        now, grown = np.array([0.0 if rested else drive[0], 0.0]), self.unbent()
+        now, grown = _now(drive, memory), self.unbent()
         tables, size = theta.reshape(self.shape), block * self.settings.blocks_at_once
         for first in range(0, len(drive) // block * block, size):
             part = drive[first : first + size]
@@ -158,6 +174,10 @@ class OneState:
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper
         return DuhemSlopes(*ends, self.lower, 0.0, self.widths, slope, rising, falling)
+
+
+def _now(drive: Array, memory: Array | None) -> Array:
+    return np.array([0.0, 0.0]) if memory is None else np.append(drive[0], memory)
 
 
 def _third(size: int) -> Array:

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
+from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.fit.dynamics import PoleBank
 from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.types import Array
 
 Operator: TypeAlias = Plays | OneState
@@ -40,7 +42,8 @@ class Layout:
     """Which parameter is where in θ, and what is known of each beforehand.
 
     ``lags`` (s), of which the first is faster than any record shows, and creep's
-    ``time_constants`` (s) have fixed places.
+    ``time_constants`` (s) have fixed places. Last comes what each record of an unknown start
+    remembers.
     """
 
     operator: Operator
@@ -48,6 +51,8 @@ class Layout:
     time_constants: Array
     settings: FitSettings
     modes: int = 0
+    unknown_starts: int = 0
+    sensor_order: int = 0
 
     @cached_property
     def parts(self) -> Mapping[str, slice]:
@@ -58,6 +63,8 @@ class Layout:
             "lags": len(self.lags),
             "modes": 4 * self.modes,
             "creep": len(self.time_constants),
+            "sensor": 1 if self.sensor_order else 0,
+            "memory": self.unknown_starts * self.operator.unknowns,
         }
         ends = np.cumsum([0, *sizes.values()])
         return {name: slice(a, b) for name, a, b in zip(sizes, ends[:-1], ends[1:], strict=True)}
@@ -65,7 +72,7 @@ class Layout:
     @property
     def size(self) -> int:
         """Number of parameters."""
-        return int(self.parts["creep"].stop)
+        return int(self.parts["memory"].stop)
 
     def start(self) -> Array:
         """θ of no hysteresis, no creep, and no vibration that is seen."""
@@ -83,6 +90,20 @@ class Layout:
         bends = theta[self.parts["map"]]
         ends = self.operator.lower, self.operator.upper
         return OutputMap(*ends, tuple(bends)) if bends.any() else None
+
+    def memory_part(self, record: Signals) -> slice:
+        """Place in θ of what a record of unknown start remembers; an empty one for any other."""
+        first, count = self.parts["memory"].start, self.operator.unknowns
+        if record.unknown is None:
+            return slice(first, first)
+        return slice(first + count * record.unknown, first + count * (record.unknown + 1))
+
+    def memory_of(self, theta: Array, record: Signals) -> Array | None:
+        """What a record remembers at its start (V), None of depolarised rest."""
+        if record.rested:
+            return None
+        found = theta[self.memory_part(record)]
+        return found if len(found) else np.zeros(self.operator.unknowns)
 
     def of_modes(self, theta: Array) -> list[Mode]:
         """Return the modes, of which θ holds ln ω, -ln ζ and both parts of κ."""
@@ -119,12 +140,20 @@ class Layout:
             omega * (-damping + 1j * np.sqrt(1.0 - damping**2)) for omega, damping, *_ in modes
         ]
         weights = [real + 1j * imag for *_, real, imag in modes]
+        sensor, none = self.sensor_of(theta), np.zeros(0, complex)
         return PoleBank(
             np.concatenate([poles, -1.0 / self.lags]),
             np.concatenate([weights, theta[self.parts["lags"]]]),
             theta[self.parts["creep"]],
             self.time_constants,
+            (none, none) if sensor is None else (sensor.poles, sensor.weights),
         )
+
+    def sensor_of(self, theta: Array) -> SensorModel | None:
+        """Return the sensor's low-pass, of which θ holds the logarithm of the corner (Hz)."""
+        if not self.sensor_order:
+            return None
+        return SensorModel(self.sensor_order, float(np.exp(theta[self.parts["sensor"]][0])))
 
     def with_mode(self, theta: Array, mode: Mode) -> tuple["Layout", Array]:
         """Add a mode, at the expense of the fastest lag."""
@@ -138,12 +167,24 @@ class Layout:
         """Return normal equations whose flattest directions exceed the rounding of others."""
         return np.asarray(matrix + self.settings.least_damping * np.diag(np.diag(matrix)))
 
+    @cached_property
+    def static(self) -> Array:
+        """Derivatives of V(0), the sum of its weights, shape (size,)."""
+        result = np.zeros(self.size)
+        result[self.parts["lags"]] = 1.0
+        result[self.parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
+        return result
+
+    def of_any_gain(self, precision: Array) -> Array:
+        """Return a prior's precision without the condition that V(0) is one."""
+        return np.asarray(precision - np.outer(self.static, self.static) / np.finfo(np.float32).eps)
+
     def prior(self, scales: Mapping[str, float], theta: Array) -> tuple[Array, Array]:
         """Precision of the prior, and its mean, shapes (size, size) and (size,).
 
-        The frequency of a mode is that of ``theta`` within a factor of e, its damping that of the
-        settings within the same factor, one standard deviation each. All weights of V add up to
-        one, which only fixes how the gain is shared with the operator.
+        The frequency of a mode and the sensor's corner are those of ``theta`` within a factor of e,
+        the damping is that of the settings within the same factor, one standard deviation each. All
+        weights of V add up to one, which only fixes how the gain is shared with the operator.
         """
         parts, s = self.parts, self.settings
         groups = [self.operator.precision(name, scales) for name in self.operator.parts]
@@ -155,15 +196,15 @@ class Layout:
         groups.append(np.diag(np.tile([1.0, 1.0, weight, weight], self.modes)))
         bent = np.diff(np.eye(len(self.time_constants)), 2, axis=0)
         groups.append((bent.T @ bent + 0.1 * np.eye(bent.shape[1])) / scales["creep"] ** 2)
+        groups.append(np.eye(1 if self.sensor_order else 0))
+        groups += self.unknown_starts * [np.diag(self.operator.expected_memory() ** -2.0)]
         matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)
-        whole = np.zeros(self.size)
-        whole[parts["lags"]] = 1.0
-        whole[parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
-        matrix += np.outer(whole, whole) / np.finfo(np.float32).eps
+        matrix += np.outer(self.static, self.static) / np.finfo(np.float32).eps
         mean[parts["lags"].start] = 1.0
         first, last = parts["modes"].start, parts["modes"].stop
         mean[first:last:4] = theta[first:last:4]
         mean[first + 1 : last : 4] = -np.log(s.damping)
+        mean[parts["sensor"]] = theta[parts["sensor"]]
         return matrix, mean
 
 

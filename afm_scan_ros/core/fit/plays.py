@@ -152,15 +152,55 @@ class Plays:
         pushed = np.clip(0.0, self.upper - self.thresholds, self.lower + self.thresholds)
         return np.where(self.thresholds > self.half, pushed, 0.0)
 
-    def start(self, drive: Array, *, rested: bool) -> Array:
+    @cached_property
+    def _hats(self) -> Array:
+        """Hats over the threshold by which the plays of an unknown start lie, (plays, unknowns)."""
+        count = self.unknowns
+        places = self.half * np.arange(count + 1.0) / count
+        each = [np.interp(self.thresholds, places, one) for one in np.eye(count + 1)[1:]]
+        return np.where(self.thresholds > self.half, 0.0, np.array(each)).T
+
+    @property
+    def unknowns(self) -> int:
+        """Number of values that say where the plays lie at an unknown start."""
+        return self.settings.memory_values
+
+    def expected_memory(self) -> Array:
+        """Standard deviation of these values (V): a play is anywhere within its threshold."""
+        shares = np.arange(1.0, self.unknowns + 1.0) / self.unknowns
+        return np.asarray(self.half / np.sqrt(3.0) * shares)
+
+    def start(self, drive: Array, memory: Array | None) -> Array:
         """Plays before a drive (V), of a scanner at depolarised rest or of one in use.
 
-        One in use has been at both ends of the range; what its smaller plays remember is not known,
-        and they are at the start of the drive.
+        One in use has been at both ends of the range. How far its plays then lie from the start of
+        the drive is its ``memory`` (V), linear between a few thresholds, and none at depolarised
+        rest.
         """
-        if rested:
+        if memory is None:
             return np.zeros(len(self.thresholds))
-        return np.where(self.thresholds > self.half, self.settled, float(drive[0]))
+        apart = np.clip(self._hats @ memory, -self.thresholds, self.thresholds)
+        return np.where(self.thresholds > self.half, self.settled, float(drive[0]) + apart)
+
+    def remembered(self, theta: Array, drive: Array, block: int, memory: Array) -> Array:
+        """∂P/∂memory averaged over blocks, shape (blocks, unknowns): of plays that never moved."""
+        start, tables, blocks = self.start(drive, memory), self.tables(theta), len(drive) // block
+        slopes = [
+            np.interp(at, self.positions, each)
+            for at, each in zip(start, np.gradient(tables, self.positions, axis=1), strict=True)
+        ]
+        free = np.abs(self._hats @ memory) < self.thresholds
+        each = self._hats * (np.array(slopes) * free)[:, np.newaxis]
+        highest, lowest = np.maximum.accumulate(drive), -np.minimum.accumulate(drive)
+        moved = np.minimum(
+            np.searchsorted(highest, start + self.thresholds, "right"),
+            np.searchsorted(lowest, self.thresholds - start, "right"),
+        )
+        lost, (block_of, within) = np.zeros((blocks + 1, self.unknowns)), np.divmod(moved, block)
+        late = (within / block)[:, np.newaxis] * each
+        np.add.at(lost, np.minimum(block_of, blocks), each - late)
+        np.add.at(lost, np.minimum(block_of + 1, blocks), late)
+        return np.asarray(each.sum(axis=0) - np.cumsum(lost, axis=0)[:blocks])
 
     def weights(self, theta: Array) -> tuple[Array, Array]:
         """Density d_r, shape (plays,), and the correction's Σ_j c_j(r) b_j as (plays, splines)."""
@@ -174,20 +214,20 @@ class Plays:
         along = np.outer(density, self.positions) + correction @ self.rises
         return np.asarray(self.widths[:, np.newaxis] * along)
 
-    def output(self, theta: Array, drive: Array, *, rested: bool) -> Array:
-        """P(u) in V for a drive u (V), both (n,)."""
-        start, tables = self.start(drive, rested=rested), self.tables(theta)
+    def output(self, theta: Array, drive: Array, memory: Array | None) -> Array:
+        """P(u) in V for a drive u (V), both (n,), after what a scanner in use remembers."""
+        start, tables = self.start(drive, memory), self.tables(theta)
         scale = (len(self.positions) - 1) / (self.upper - self.lower)
         return _output(drive, self.thresholds, start, tables, self.lower, scale)
 
     def pieces(
-        self, _: Array, drive: Array, block: int, *, rested: bool
+        self, _: Array, drive: Array, block: int, memory: Array | None
     ) -> Iterator[NDArray[np.float32]]:
         """Yield ∂P/∂theta averaged over blocks, in pieces of shape (blocks, parameters).
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
-        mean = _means(drive, self.thresholds, self.start(drive, rested=rested), block)
+        mean = _means(drive, self.thresholds, self.start(drive, memory), block)
         at_once = self.settings.blocks_at_once
         for first in range(0, len(mean), at_once):
             yield self._columns(mean[first : first + at_once])

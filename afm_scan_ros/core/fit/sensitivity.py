@@ -26,8 +26,8 @@ def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
     """Simulate a record exactly; raises InputError where the map behind the operator turns back."""
     operator, mapped = layout.of_operator(theta), layout.map_of(theta)
     before = np.zeros(1) if record.rested else record.drive[:1]
-    raw = layout.operator.output(operator, record.drive, rested=record.rested)
-    rest = layout.operator.output(operator, before, rested=record.rested)
+    memory = layout.memory_of(theta, record)
+    raw, rest = (layout.operator.output(operator, one, memory) for one in (record.drive, before))
     if mapped is not None:
         raw, rest = mapped.output(raw), mapped.output(rest)
     settled, dynamics = float(rest[0]), layout.dynamics(theta)
@@ -50,19 +50,19 @@ def jacobian(
     parts, used = layout.parts, record.used
     vibration = slice(parts["lags"].start, parts["modes"].stop)
     moved, late = _of_vibration(layout, theta, record, simulation), simulation.response.late
-    if pieces is None:
-        of_operator = iter([np.zeros((record.blocks, parts["map"].stop))])
-    else:
-        of_operator = _of_operator(layout, theta, record, simulation, pieces)
+    corner = _of_sensor(layout, theta, record, simulation)
+    memory, count = layout.memory_part(record), 0 if pieces is None else parts["map"].stop
     first = 0
-    for one in of_operator:
+    for one in _of_operator(layout, theta, record, simulation, pieces):
         last = first + len(one)
         if last > used.start:
             rows = slice(max(first, used.start), last)
-            result = np.empty((last - rows.start, layout.size))
-            result[:, : parts["map"].stop] = one[rows.start - first :]
+            result = np.zeros((last - rows.start, layout.size))
+            result[:, :count] = one[rows.start - first :, :count]
+            result[:, memory] = one[rows.start - first :, count:]
             result[:, vibration] = moved[rows]
             result[:, parts["creep"]] = late[rows]
+            result[:, parts["sensor"]] = corner[rows]
             yield slice(rows.start - used.start, last - used.start), result
         first = last
 
@@ -85,12 +85,13 @@ def pulled(
     vibration = slice(parts["lags"].start, parts["modes"].stop)
     result[vibration] = whole @ _of_vibration(layout, theta, record, simulation)
     result[parts["creep"]] = whole @ simulation.response.late
+    result[parts["sensor"]] = whole @ _of_sensor(layout, theta, record, simulation)
     if pieces is not None:
         operator, mapped = layout.operator, layout.map_of(theta)
         bank, first = simulation.dynamics.parallel(), 0
         inputs, settled = pulled_inputs(bank, record.period, whole, record.block)
         if record.rested:
-            result[: parts["map"].stop] += settled * _at_rest(layout, theta)
+            result[: parts["map"].stop] += settled * _by_rest(layout, theta)
         else:
             inputs[0] += settled
         effective = averaged(simulation.effective, record.block)
@@ -98,6 +99,7 @@ def pulled(
             inputs /= mapped.slope(effective)
         bends = terms(effective, operator.lower, operator.upper, operator.bends)
         result[parts["map"]] -= inputs @ bends
+        result[layout.memory_part(record)] = inputs @ _remembered(layout, theta, record)
         for columns in pieces:
             part = inputs[first : first + len(columns)]
             result[: columns.shape[1]] += np.matmul(part.astype(columns.dtype), columns)
@@ -106,33 +108,60 @@ def pulled(
 
 
 def _of_operator(
-    layout: Layout, theta: Array, record: Signals, simulation: Simulation, pieces: Iterable[Columns]
+    layout: Layout,
+    theta: Array,
+    record: Signals,
+    simulation: Simulation,
+    pieces: Iterable[Columns] | None,
 ) -> Iterator[Array]:
     """Derivatives by the operator and its map, as inputs held over blocks, through V and C.
 
-    From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF).
+    From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF). Last come
+    those by the record's memory, which are alone where the operator is held.
     """
     operator, mapped = layout.operator, layout.map_of(theta)
     effective = averaged(simulation.effective, record.block)
     bends = terms(effective, operator.lower, operator.upper, operator.bends)
     slopes = np.ones_like(effective) if mapped is None else mapped.slope(effective)
+    held = pieces is None
+    if pieces is None:
+        pieces, bends = [np.zeros((record.blocks, 0))], bends[:, :0]
+    remembered = _remembered(layout, theta, record)
     bank, first, through = simulation.dynamics.parallel(), 0, None
     for columns in pieces:
         part, first = slice(first, first + len(columns)), first + len(columns)
-        inputs = np.hstack([columns.astype(float), -bends[part]])
+        inputs = np.hstack([columns.astype(float), -bends[part], remembered[part]])
         inputs /= slopes[part, np.newaxis]
         if through is None:
-            settled = _at_rest(layout, theta) if record.rested else inputs[0]
+            rest = np.zeros(0) if held else _by_rest(layout, theta)
+            settled = rest if record.rested else inputs[0]
             through = HeldFilter(bank, 0.0, record.length, record.block, settled)
         yield through(inputs)
 
 
-def _at_rest(layout: Layout, theta: Array) -> Array:
+def _remembered(layout: Layout, theta: Array, record: Signals) -> Array:
+    """∂A/∂memory averaged over blocks, (blocks, unknowns); no column where the start is known."""
+    memory = layout.memory_of(theta, record)
+    if record.unknown is None or memory is None:
+        return np.zeros((record.blocks, 0))
+    given = layout.of_operator(theta), record.drive, record.block, memory
+    return layout.operator.remembered(*given)
+
+
+def at_rest(layout: Layout, theta: Array) -> Array:
+    """F (V) at depolarised rest, shape (1,)."""
+    mapped, at = (
+        layout.map_of(theta),
+        layout.operator.output(layout.of_operator(theta), np.zeros(1), None),
+    )
+    return at if mapped is None else mapped.output(at)
+
+
+def _by_rest(layout: Layout, theta: Array) -> Array:
     """Derivatives of F at depolarised rest by the operator and its map."""
     operator, given, rest = layout.operator, layout.of_operator(theta), np.zeros(1)
-    mapped, at = layout.map_of(theta), operator.output(given, rest, rested=True)
-    at = at if mapped is None else mapped.output(at)
-    (columns,) = operator.pieces(given, rest, 1, rested=True)
+    mapped, at = layout.map_of(theta), at_rest(layout, theta)
+    (columns,) = operator.pieces(given, rest, 1, None)
     bends = terms(at, operator.lower, operator.upper, operator.bends)
     slope = 1.0 if mapped is None else mapped.slope(at)[0]
     return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
@@ -140,11 +169,11 @@ def _at_rest(layout: Layout, theta: Array) -> Array:
 
 def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
     """Derivatives by the weights of the lags, and by what θ holds of each mode."""
-    dynamics, response = simulation.dynamics, simulation.response
-    columns = [response.lags]
-    settled = [np.full(response.lags.shape[1], simulation.settled)]
+    dynamics = simulation.dynamics
+    modes, changes, lags = dynamics.seen(simulation.response)
+    columns, settled = [lags], [np.full(lags.shape[1], simulation.settled)]
     for i, (omega, damping, *_) in enumerate(layout.of_modes(theta)):
-        state, change = response.modes[:, i], dynamics.weights[i] * response.changes[:, i]
+        state, change = modes[:, i], dynamics.weights[i] * changes[:, i]
         pole = dynamics.poles[i]
         turned = omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
         moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]
@@ -154,3 +183,19 @@ def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Sim
     bank = slow, dynamics.gains.astype(np.complex128)
     creep = HeldFilter(bank, 1.0, record.length, record.block, np.concatenate(settled))
     return creep(np.hstack(columns))
+
+
+def _of_sensor(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
+    """Derivative by the logarithm of the sensor's corner, (blocks, 1), by a difference.
+
+    There is no column without a sensor.
+    """
+    part, apart = layout.parts["sensor"], float(np.cbrt(np.finfo(float).eps))
+    step = np.zeros(layout.size)
+    step[part] = apart
+    given = record.period, simulation.effective, record.block, simulation.settled
+    ends = [layout.dynamics(theta + way * step) for way in (1.0, -1.0) if layout.sensor_order]
+    if not ends:
+        return np.zeros((record.blocks, 0))
+    up, down = (respond(one, *given).output for one in ends)
+    return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))

@@ -51,6 +51,12 @@ class FitSettings:
         "levels of the direct inverse's surface",
         "interpolation errs less than the direct method",
     )
+    memory_values: int = setting(
+        10,
+        "1",
+        "thresholds between which the memory of plays at an unknown start is linear",
+        "a turn of the drive leaves a bend at its swing: of several, the largest few count",
+    )
     slope_cells_drive: int = setting(
         8,
         "1",
@@ -141,6 +147,12 @@ class FitSettings:
         "share of the greatest values at which their search begins",
         "a decade below",
     )
+    steepest_sensor: int = setting(
+        4,
+        "1",
+        "greatest order of a sensor's low-pass; the even ones up to it are tried",
+        "filters of instruments have 12 or 24 dB an octave",
+    )
     lag_weight: float = setting(
         0.1,
         "static gain",
@@ -207,11 +219,29 @@ class FitSettings:
         "half width of the band in which a mode is sought",
         "a few bandwidths of a mode, over which other modes and hysteresis are smooth",
     )
-    mode_trials: int = setting(
-        40,
+    tried_damping: float = setting(
+        0.06,
         "1",
-        "frequencies and dampings tried to refine a mode that was found",
-        "on scanners made for tests within 2 % of the damping that 400 trials find",
+        "damping of the modes that are tried first, at distances of their half-power bandwidths",
+        "thrice what is expected: beside a sharper one it explains a third as much",
+    )
+    near_chance: float = setting(
+        0.3,
+        "1",
+        "share of what a mode has to explain from which on its neighbours are tried",
+        "the same third",
+    )
+    modes_at_once: int = setting(
+        64,
+        "1",
+        "modes that are tried at a time",
+        "their derivatives are as many as the operator's",
+    )
+    mode_values: int = setting(
+        10_000_000,
+        "1",
+        "blocks times modes that are tried at a time",
+        "their derivatives fit into a gigabyte",
     )
     greatest_damping: float = setting(
         0.12,

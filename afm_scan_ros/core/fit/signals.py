@@ -16,7 +16,8 @@ from afm_scan_ros.core.types import Array
 class Signals:
     """Drive u (V) and displacement y (m), both (n,), that count from sample ``first`` on.
 
-    ``rested`` is whether the scanner had long rested at 0 V, depolarised. ``noise`` (m) is the
+    ``rested`` is whether the scanner had long rested at 0 V, depolarised; otherwise ``unknown``
+    says which of the unknown starts of a fit the record has, where it has one. ``noise`` (m) is the
     standard deviation of a sample, ``tones`` (Hz) are sines in the displacement.
     """
 
@@ -29,6 +30,7 @@ class Signals:
     rested: bool
     noise: float
     tones: tuple[float, ...] = ()
+    unknown: int | None = None
 
     @property
     def blocks(self) -> int:
@@ -97,7 +99,7 @@ def signals_of(
     depolarised: bool,
     settings: FitSettings,
 ) -> Signals:
-    """Choose the blocks of a record, and from where on its memory is known."""
+    """Choose the blocks of a record."""
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
     if len(drive) < settings.fewest_blocks:
@@ -105,8 +107,7 @@ def signals_of(
             f"{name}: holds only {len(drive)} samples: give a record of"
             f" {settings.fewest_blocks} at least"
         )
-    first = known_from(drive, settings, depolarised=depolarised)
-    return Signals(name, drive, displacement, period, block, first, depolarised, noise)
+    return Signals(name, drive, displacement, period, block, 0, depolarised, noise)
 
 
 def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:
@@ -187,7 +188,7 @@ def _bend(signal: Array, block: int) -> float:
 
 
 def known_from(drive: Array, settings: FitSettings, *, depolarised: bool) -> int:
-    """Sample from which on a record counts, as the scanner's memory is then known.
+    """Sample from which on a prediction of a record counts, as the memory is then known.
 
     From an unknown start all is written anew when the drive has been near both of its ends. Where
     it hardly moves after that, or the record ends, the whole record counts all the same, as of a

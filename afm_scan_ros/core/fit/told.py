@@ -82,7 +82,7 @@ class Knowledge:
         record = Signals("scan", drive, still, period, 1, 1000, rested=False, noise=0.0)
         simulation = simulate(layout, fit.theta, record)
         theta = layout.of_operator(fit.theta)
-        pieces = layout.operator.pieces(theta, drive, 1, rested=False)
+        pieces = layout.operator.pieces(theta, drive, 1, layout.memory_of(fit.theta, record))
         rows = [one for _, one in jacobian(layout, fit.theta, record, simulation, pieces)]
         change = np.concatenate(rows)
         change -= change.mean(axis=0)
@@ -143,9 +143,9 @@ def _opening(fit: AxisFit) -> tuple[float, Array]:
     operator, count = fit.layout.operator, fit.layout.settings.direct_levels
     up = np.linspace(operator.lower, operator.upper, 2 * count + 1)
     drive = np.concatenate([up, up[-2::-1]])
-    theta = fit.layout.of_operator(fit.theta)
-    output = operator.output(theta, drive, rested=False)
-    rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, 1, rested=False))])
+    theta, used = fit.layout.of_operator(fit.theta), np.zeros(operator.unknowns)
+    output = operator.output(theta, drive, used)
+    rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, 1, used))])
     row = np.zeros(fit.layout.size)
     row[: rows.shape[1]] = rows[3 * count] - rows[count]
     return float(output[3 * count] - output[count]), row

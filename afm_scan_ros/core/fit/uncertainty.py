@@ -66,7 +66,7 @@ def predicted(fit: AxisFit, drive: Array, period: float) -> PredictedMotion:
     simulation = simulate(fit.layout, fit.theta, record)
     moved = fit.gain * (simulation.response.output - simulation.response.output[0])
     theta = fit.layout.of_operator(fit.theta)
-    pieces = operator.pieces(theta, drive, 1, rested=True)
+    pieces = operator.pieces(theta, drive, 1, None)
     variance, rest = np.empty(count), None
     spread = partial(np.einsum, "ij,jk,ik->i", optimize=True)
     known = covariance(fit)

@@ -241,11 +241,8 @@ class UncertainScan(Finding):
 
 
 @frozen
-class UnknownStart(Finding):
-    """A record whose initial memory is unknown, so that its first ``seconds`` are not fitted.
+class SensorLowPass(Finding):
+    """A sensor that reads through a low-pass of an ``order`` and a ``corner`` (Hz)."""
 
-    Where these are 0, no part of the record is known better, and all of it is.
-    """
-
-    record: str
-    seconds: float
+    order: int
+    corner: float

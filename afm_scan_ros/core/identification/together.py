@@ -20,8 +20,8 @@ from afm_scan_ros.core.identification.findings import (
     NotConverged,
     NotValidated,
     ReadAfterUpdate,
+    SensorLowPass,
     UncertainScan,
-    UnknownStart,
     ValidationMismatch,
 )
 from afm_scan_ros.core.identification.validation import (
@@ -125,8 +125,8 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
         error = fit.discrepancy * record.motion
         if large := tuple((tone, size) for tone, size in tones if size > error):
             yield Hum(record.name, large)
-        if not record.rested:
-            yield UnknownStart(record.name, record.first * record.period)
+    if sensor := fit.layout.sensor_of(fit.theta):
+        yield SensorLowPass(sensor.order, sensor.corner)
     if not fit.converged:
         yield NotConverged(fit.remaining)
 

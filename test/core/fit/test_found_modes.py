@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.modes import best_mode, clear, large
+from afm_scan_ros.core.fit.modes import first_mode, further_mode
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     CREEP,
@@ -15,7 +16,6 @@ from helpers.fit_cases import (
     FREQUENCY,
     GAIN,
     PERIOD,
-    SETTINGS,
     displaced,
     levels,
     of_plays,
@@ -42,11 +42,11 @@ def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
     line = float(drive @ moved / (drive @ drive))
     fit = AxisFit(layout, given, line, theta)
     fit.weigh()
-    found = best_mode(fit, large)
+    found = first_mode(fit)
     assert found is not None
     assert abs(line / GAIN - 1.0) > 0.5
     assert line * found.gain == pytest.approx(GAIN * (1.0 + CREEP[0]), rel=0.15)
-    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.02)
 
 
 def test_a_mode_is_seen_beside_a_record_of_noise() -> None:
@@ -58,10 +58,9 @@ def test_a_mode_is_seen_beside_a_record_of_noise() -> None:
     given += of_plays_alone(slow, moved)[1]
     fit = AxisFit(layout, given, gain, theta)
     fit.weigh()
-    found = best_mode(fit, large)
+    found = first_mode(fit)
     assert found is not None
-    assert found.share > SETTINGS.dominant_share
-    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.02)
 
 
 def test_a_mode_is_seen_beside_loops_that_are_not_fitted() -> None:
@@ -73,11 +72,10 @@ def test_a_mode_is_seen_beside_loops_that_are_not_fitted() -> None:
     layout, given, _, theta = of_plays_alone(drive, record(of_plays, drive).displacement[:, 0])
     fit = AxisFit(layout, given, GAIN, theta)
     fit.weigh()
-    found = best_mode(fit, clear)
+    found = further_mode(fit)
     assert found is not None
-    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.01)
-    assert found.mode[1] == pytest.approx(DAMPING, rel=0.4)
-    assert found.share > SETTINGS.mode_share
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.02)
+    assert found.mode[1] == pytest.approx(DAMPING, rel=0.6)
 
 
 @given(seed=st.integers(0, 10_000))
@@ -88,4 +86,27 @@ def test_noise_has_no_mode(seed: int) -> None:
     moved = GAIN * drive + 1e-9 * rng.standard_normal(len(drive))
     fit = AxisFit(*of_plays_alone(drive, moved)[:2], GAIN, of_plays_alone(drive, moved)[3])
     fit.weigh()
-    assert best_mode(fit, clear) is None
+    assert further_mode(fit) is None
+
+
+def test_neither_plays_nor_lags_hide_a_mode() -> None:
+    """They imitate what rings behind the corners of triangles, if they are fitted first."""
+    cycles = np.interp(np.arange(12_000) % 1000, [0, 500, 1000], [0.0, 1.0, 0.0])
+    drive = cycles * np.linspace(4.0, 1.0, len(cycles))
+    fit = AxisFit(*of_plays_alone(drive, record(of_plays, drive).displacement[:, 0]))
+    settle(fit, 8, (*fit.layout.operator.parts, "lags", "creep"))
+    found = further_mode(fit)
+    assert found is not None
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.05)
+
+
+def test_a_bend_of_the_response_is_no_mode() -> None:
+    """A lag is explained best by the greatest damping."""
+    rng = np.random.default_rng(4)
+    drive = levels(5, 30, 600)
+    pole = np.exp(-PERIOD * 2.0 * np.pi * FREQUENCY)
+    moved = GAIN * signal.lfilter([0.0, 1.0 - pole], [1.0, -pole], drive)
+    moved += 1e-9 * rng.standard_normal(len(drive))
+    fit = AxisFit(*of_plays_alone(drive, moved))
+    fit.weigh()
+    assert further_mode(fit) is None

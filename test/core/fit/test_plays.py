@@ -30,8 +30,8 @@ def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     surface = bank.surface(theta)
     model = Preisach(surface)
     of_model = model.apply(model.at_rest(), drive)[1]
-    of_plays = bank.output(theta, drive, rested=True)
-    apart = of_model - (of_plays - bank.output(theta, np.zeros(1), rested=True))
+    of_plays = bank.output(theta, drive, None)
+    apart = of_model - (of_plays - bank.output(theta, np.zeros(1), None))
     assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
 
 
@@ -45,7 +45,7 @@ def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float
     model = Preisach(surface)
     assert model.at_rest().now[1] == pytest.approx(0.0, abs=1e-12)
     path = np.interp(np.arange(700), np.arange(0, 701, 100), [0, high, low, high, 1, 3, 0.5, 2])
-    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, rested=True)
+    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, None)
     assert np.ptp(apart[200:]) < 1e-3 * (high - low)
 
 
@@ -81,7 +81,7 @@ def test_plays_that_no_surface_has_are_held_to_one() -> None:
     theta[12:20] = -12.0
     with pytest.raises(InputError, match="does not grow"):
         operator.surface(theta)
-    moved = GAIN * operator.output(theta, drive, rested=True)
+    moved = GAIN * operator.output(theta, drive, None)
     fit = AxisFit(*of_plays_alone(drive, moved))
     settle(fit, 20, ("density", "correction"))
     with pytest.raises(InputError, match="does not grow"):

@@ -17,7 +17,6 @@ from afm_scan_ros.core.identification.findings import (
     Hum,
     NotValidated,
     UncertainScan,
-    UnknownStart,
 )
 from afm_scan_ros.core.identification.together import FittedAxis, identify_together
 from afm_scan_ros.core.model import ParameterInterval, Status
@@ -124,12 +123,6 @@ def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
     assert known.record.startswith("fresh")
     assert [each.fitted for each in fitted] == [True]
     assert not any(isinstance(each, NotValidated) for each in fit.warnings)
-
-
-def test_what_precedes_a_known_memory_is_named(fit: FittedAxis) -> None:
-    unknown = [each for each in fit.warnings if isinstance(each, UnknownStart)]
-    lengths = [each.seconds for each in unknown]
-    assert all(LOWEST - 10 < each / SAMPLE_PERIOD <= LOWEST for each in lengths)
 
 
 def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
