@@ -141,6 +141,15 @@ def _(one: found.ResponseMisfit) -> str:
 
 
 @finding_text.register
+def _(one: found.UnknownStart) -> str:
+    return (
+        f"The hysteresis' state at the start of {one.record} is unknown, so its first"
+        f" {one.seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state"
+        " that."
+    )
+
+
+@finding_text.register
 def _(one: found.SensorLowPass) -> str:
     return (
         f"The displacement is read through a low-pass of order {one.order} at {one.corner:.4g} Hz,"

@@ -33,6 +33,7 @@ from afm_scan_ros.core.identification.findings import (
     UncertainScan,
     UndeterminedCreepElement,
     UnfinishedRecord,
+    UnknownStart,
     UnmodelledDelay,
     ValidationMismatch,
 )
@@ -88,6 +89,7 @@ EXAMPLES: dict[Finding, tuple[str, ...]] = {
     ReadAfterUpdate("steps"): ("displacement in steps", "after the drive's update", "next sample"),
     UncertainScan(0.034): ("3.4% of its range", "triangles or loops"),
     NotConverged(12.5): ("has not converged", "12.5 nat", "further records"),
+    UnknownStart("scan", 0.25): ("start of scan is unknown", "0.25 s", "Depolarise"),
     SensorLowPass(2, 512.3): ("low-pass of order 2 at 512.3 Hz", "ahead of what the sensor shows"),
 }
 

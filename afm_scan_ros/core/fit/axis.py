@@ -56,6 +56,10 @@ def fit_axis(
         Where the fit diverges.
     """
     fit = started(records, axis, settings)
+    for record in fit.records:
+        if record.first:
+            known = record.first * record.period
+            progress(f"{record.name}: its memory is known from {known:.3g} s")
     fit.weigh()
     progress("looking for modes")
     if found := _first_mode(fit):
@@ -192,7 +196,7 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
         )
         for record, drive in zip(given, drives, strict=True)
     ]
-    begun = [k for k, one in enumerate(signals) if not one.rested]
+    begun = [k for k, one in enumerate(signals) if not one.rested and not one.first]
     for place, k in enumerate(begun):
         signals[k] = evolve(signals[k], unknown=place)
     longest = max(len(one.drive) * one.period for one in signals)

@@ -9,7 +9,7 @@ with the normal equations' H and b. So neither plays nor lags hide a resonance b
 it. This is Rao's score test. Source: C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 
 import numpy as np
@@ -33,6 +33,8 @@ class FoundMode:
 
 Place = tuple[float, float]
 """Angular frequency (rad/s) and damping."""
+Spectrum = tuple[NDArray[np.floating], NDArray[np.floating]]
+"""Angular frequencies (rad/s) and power over that of noise, both (n,)."""
 
 
 def first_mode(fit: AxisFit) -> FoundMode | None:
@@ -57,36 +59,54 @@ def further_mode(fit: AxisFit) -> FoundMode | None:
     found = _best(fit, np.ones(fit.layout.size, bool), settings.mode_chance)
     if found is None or np.hypot(*found.mode[2:]) > settings.heaviest_mode:
         return None
-    misfit, lines = _left_about(fit, found.mode[0])
+    misfit, lines, _ = _left_about(_spectra(fit), found.mode[0], settings.mode_band)
     share = min(found.chance / misfit, 1.0 - settings.tone_chance)
     seen = -lines * np.log1p(-share) > settings.mode_chance
     return found if seen and share > settings.mode_share else None
 
 
 def _best(fit: AxisFit, free: NDArray[np.bool_], enough: float) -> FoundMode | None:
-    """Search all frequencies that the records resolve, and then about the best one.
+    """Try peaks of what is left, and then places about the best one.
 
     What is explained best by the greatest damping is a bend of the response, and no mode.
     """
-    settings, pitch = fit.layout.settings, 2.0 * fit.layout.settings.tried_damping
-    lowest, highest = _band(fit)
-    count = int(np.log(highest / lowest) / pitch) if highest > lowest else 0
-    grid = [(omega, settings.tried_damping) for omega in np.geomspace(lowest, highest, count + 1)]
-    found = max(_tried(fit, grid, free), key=_chance, default=None)
+    settings = fit.layout.settings
+    width = 2.0 * settings.tried_damping
+    peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
+    found = max(_tried(fit, peaks, free), key=_chance, default=None)
     if found is None or found.chance < settings.near_chance * enough:
         return None
     dampings = np.geomspace(settings.damping / 4.0, settings.greatest_damping, 5)
-    found = max(found, *_tried(fit, _about(found, pitch, dampings), free), key=_chance)
+    found = max(found, *_tried(fit, _about(found, 0.5 * width, dampings), free), key=_chance)
     if found.mode[1] == dampings[-1] or found.chance < enough:
         return None
     nearer = found.mode[1] * np.geomspace(0.5, 2.0, 5)
-    return max(found, *_tried(fit, _about(found, 0.25 * pitch, nearer), free), key=_chance)
+    return max(found, *_tried(fit, _about(found, 0.15 * width, nearer), free), key=_chance)
 
 
 def _about(found: FoundMode, width: float, dampings: Array) -> list[Place]:
     """Places about a mode, within a ``width`` of the logarithm of its frequency."""
-    near = found.mode[0] * np.exp(width * np.linspace(-1.0, 1.0, 9))
+    near = found.mode[0] * np.exp(width * np.linspace(-1.0, 1.0, 5))
     return [(float(omega), float(damping)) for omega in near for damping in dampings]
+
+
+def _peaks(fit: AxisFit, width: float, enough: float) -> list[float]:
+    """Angular frequencies (rad/s) about which more is left than beside them, the most first.
+
+    Each is that of a band of a ``width``, in which the power of what is left exceeds that of noise
+    by a part of ``enough`` (nat) at least.
+    """
+    settings, (lowest, highest) = fit.layout.settings, _band(fit)
+    count = int(np.log(highest / lowest) / width) if highest > lowest else 0
+    grid = np.geomspace(lowest, highest, 2 * count + 1)
+    spectra = _spectra(fit)
+    left = np.array([_left_about(spectra, omega, 0.5 * width) for omega in grid])
+    misfit, _, bins = np.pad(left, ((1, 1), (0, 0))).T
+    density = misfit / np.maximum(bins, 1.0)
+    peaks = np.flatnonzero((density[1:-1] >= density[:-2]) & (density[1:-1] >= density[2:]))
+    excess = (misfit - bins)[1:-1]
+    some = [k for k in peaks if excess[k] > settings.near_chance * enough]
+    return [float(grid[k]) for k in sorted(some, key=lambda k: -excess[k])[: settings.most_peaks]]
 
 
 def _chance(found: FoundMode) -> float:
@@ -110,7 +130,7 @@ def _tried(fit: AxisFit, places: Sequence[Place], free: NDArray[np.bool_]) -> It
     So many are tried at a time as memory holds derivatives of.
     """
     blocks, settings = max(one.blocks for one in fit.records), fit.layout.settings
-    at_once = min(settings.modes_at_once, max(settings.mode_values // blocks, 1))
+    at_once = max(settings.mode_values // blocks, 1)
     for first in range(0, len(places), at_once):
         yield from _tried_at_once(fit, places[first : first + at_once], free)
 
@@ -142,17 +162,30 @@ def _tried_at_once(
         yield FoundMode(mode, 0.5 * float(pull @ pair), gain)
 
 
-def _left_about(fit: AxisFit, omega: float) -> tuple[float, float]:
-    """What is left (nat) in a band about an angular frequency (rad/s), and of how many lines.
-
-    A line counts by its share of the power, as the sharp ones of a periodic drive do not tell more
-    than they are.
-    """
-    misfit, lines, width = 0.0, 0.0, fit.layout.settings.mode_band
+def _spectra(fit: AxisFit) -> list[Spectrum]:
+    """Spectra of what is left of each record, over what noise leaves in a bin."""
+    found: list[Spectrum] = []
     for record, left in zip(fit.records, fit.residuals(fit.simulated(fit.theta)), strict=True):
         at = 2.0 * np.pi * np.fft.rfftfreq(len(left), record.length)
-        spectrum = np.fft.rfft(np.hanning(len(left)) * left)[np.abs(at - omega) < width * omega]
-        power = np.abs(spectrum) ** 2 / (0.375 * len(left) * fit.variance(record))
-        misfit += float(power.sum())
-        lines += float(power.sum() ** 2 / (power**2).sum()) if power.any() else 0.0
-    return misfit, lines
+        window = np.hanning(len(left))
+        noise = float(window @ window) * fit.variance(record)
+        found.append((at, np.abs(np.fft.rfft(window * left)) ** 2 / noise))
+    return found
+
+
+def _left_about(
+    spectra: Iterable[Spectrum], omega: float, width: float
+) -> tuple[float, float, float]:
+    """What is left (nat) within a band about an angular frequency (rad/s), and of how many lines.
+
+    The band is of a ``width`` to either side, over its frequency. A line counts by its share of the
+    power, as the sharp ones of a periodic drive do not tell more than they are. The last is the
+    number of bins, which is what noise leaves.
+    """
+    misfit, lines, bins = 0.0, 0.0, 0.0
+    for at, power in spectra:
+        ends = omega * (1.0 - width), omega * (1.0 + width)
+        part = power[slice(*np.searchsorted(at, ends))]
+        misfit, bins = misfit + float(part.sum()), bins + len(part)
+        lines += float(part.sum() ** 2 / (part**2).sum()) if part.any() else 0.0
+    return misfit, lines, bins

@@ -51,6 +51,12 @@ class FitSettings:
         "levels of the direct inverse's surface",
         "interpolation errs less than the direct method",
     )
+    most_left_out: float = setting(
+        0.5,
+        "1",
+        "share of a record before its memory is known from which on that memory is estimated",
+        "less than half is told by the rest, without a further parameter",
+    )
     memory_values: int = setting(
         10,
         "1",
@@ -222,7 +228,7 @@ class FitSettings:
     tried_damping: float = setting(
         0.06,
         "1",
-        "damping of the modes that are tried first, at distances of their half-power bandwidths",
+        "damping of the modes that are tried first, and half the width of a band",
         "thrice what is expected: beside a sharper one it explains a third as much",
     )
     near_chance: float = setting(
@@ -231,11 +237,11 @@ class FitSettings:
         "share of what a mode has to explain from which on its neighbours are tried",
         "the same third",
     )
-    modes_at_once: int = setting(
-        64,
+    most_peaks: int = setting(
+        20,
         "1",
-        "modes that are tried at a time",
-        "their derivatives are as many as the operator's",
+        "peaks of what is left about which a mode is tried",
+        "harmonics of a periodic drive are peaks too",
     )
     mode_values: int = setting(
         10_000_000,

@@ -99,7 +99,10 @@ def signals_of(
     depolarised: bool,
     settings: FitSettings,
 ) -> Signals:
-    """Choose the blocks of a record."""
+    """Choose the blocks of a record, and from where on it counts.
+
+    What comes before its memory is known is left out, unless that is most of it.
+    """
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
     if len(drive) < settings.fewest_blocks:
@@ -107,7 +110,9 @@ def signals_of(
             f"{name}: holds only {len(drive)} samples: give a record of"
             f" {settings.fewest_blocks} at least"
         )
-    return Signals(name, drive, displacement, period, block, 0, depolarised, noise)
+    first = known_from(drive, settings, depolarised=depolarised)
+    first = first if first < settings.most_left_out * len(drive) else 0
+    return Signals(name, drive, displacement, period, block, first, depolarised, noise)
 
 
 def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:

@@ -241,6 +241,14 @@ class UncertainScan(Finding):
 
 
 @frozen
+class UnknownStart(Finding):
+    """A record whose initial memory is unknown, so that its first ``seconds`` are not fitted."""
+
+    record: str
+    seconds: float
+
+
+@frozen
 class SensorLowPass(Finding):
     """A sensor that reads through a low-pass of an ``order`` and a ``corner`` (Hz)."""
 

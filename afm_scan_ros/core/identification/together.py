@@ -22,6 +22,7 @@ from afm_scan_ros.core.identification.findings import (
     ReadAfterUpdate,
     SensorLowPass,
     UncertainScan,
+    UnknownStart,
     ValidationMismatch,
 )
 from afm_scan_ros.core.identification.validation import (
@@ -125,6 +126,9 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
         error = fit.discrepancy * record.motion
         if large := tuple((tone, size) for tone, size in tones if size > error):
             yield Hum(record.name, large)
+    for record in fit.records:
+        if record.first:
+            yield UnknownStart(record.name, record.first * record.period)
     if sensor := fit.layout.sensor_of(fit.theta):
         yield SensorLowPass(sensor.order, sensor.corner)
     if not fit.converged:
