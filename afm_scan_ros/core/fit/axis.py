@@ -121,12 +121,13 @@ def _better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one with a low-pass of the sensor that has clearly the greater evidence.
 
-    A steeper one is tried where the last was better, and not enough.
+    A steeper one is tried where the last was better, and not enough. None is where only noise is
+    left: what a low-pass leaves of slow records is slight, and large at other rates.
     """
     for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
         name = f"a sensor's low-pass of order {order}"
         other = fit
-        if not fit.sufficient:
+        if not fit.at_noise:
             other = _preferred(fit, partial(with_sensor, fit, order), progress, name)
         if other is fit:
             break

@@ -91,12 +91,16 @@ class AxisFit:
         return self.remaining < self.layout.settings.converged * self.layout.size
 
     @property
-    def sufficient(self) -> bool:
-        """Whether the discrepancy is slight, or a small part of what each record varies by."""
+    def at_noise(self) -> bool:
+        """Whether the discrepancy is a small part of what each record varies by."""
         each = [(one, self.variance(one)) for one in self.records]
         shares = [(self.discrepancy * one.motion) ** 2 / whole for one, whole in each]
-        settings = self.layout.settings
-        return max(shares) < settings.lost or self.discrepancy < settings.slight
+        return max(shares) < self.layout.settings.lost
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether the discrepancy is slight, or a small part of what each record varies by."""
+        return self.at_noise or self.discrepancy < self.layout.settings.slight
 
     def variance(self, record: Signals) -> float:
         """Variance v_k of the mean of a block, m²."""
