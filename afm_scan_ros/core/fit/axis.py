@@ -125,13 +125,12 @@ def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     left: what a low-pass leaves of slow records is slight, and large at other rates.
     """
     for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
-        name = f"a sensor's low-pass of order {order}"
-        other = fit
-        if not fit.at_noise:
-            other = _preferred(fit, partial(with_sensor, fit, order), progress, name)
-        if other is fit:
+        if fit.at_noise:
             break
-        fit = other
+        before, name = fit, f"a sensor's low-pass of order {order}"
+        fit = _preferred(fit, partial(with_sensor, fit, order), progress, name)
+        if fit is before:
+            break
     return fit
 
 
@@ -253,15 +252,15 @@ def _add(fit: AxisFit, found: FoundMode) -> None:
 
 
 def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
-    """Return the fit with a sensor's low-pass that lags as much as its vibration does.
+    """Return the fit with a sensor's low-pass that lags as much as its vibration as read does.
 
     What vibrates is sought anew. Returns None where nothing lags, or where the low-pass explains
     hardly anything of what is left while the operator is held.
     """
-    dynamics, settings = fit.layout.dynamics(fit.theta), fit.layout.settings
-    lag = -float(np.sum((dynamics.weights / dynamics.poles).real))
+    settings, read = fit.layout.settings, fit.layout.dynamics(fit.theta).read()
     unit = SensorModel(order, 1.0)
-    corner = -float(np.sum((unit.weights / unit.poles).real)) / max(lag, np.finfo(float).tiny)
+    lag, of_unit = (-float(np.sum((b.weights / b.poles).real)) for b in (read, unit))
+    corner = of_unit / max(lag, np.finfo(float).tiny)
     if corner > 0.5 / min(one.period for one in fit.records):
         return None
     laid = evolve(fit.layout, modes=0, sensor_order=order)
