@@ -66,16 +66,21 @@ def further_mode(fit: AxisFit) -> FoundMode | None:
 
 
 def _best(fit: AxisFit, free: NDArray[np.bool_], enough: float) -> FoundMode | None:
-    """Try peaks of what is left, and then places about the best one.
+    """Try peaks of what is left, climb from the best one, and then try dampings about the summit.
 
     What is explained best by the greatest damping is a bend of the response, and no mode.
     """
-    settings = fit.layout.settings
+    settings, tried = fit.layout.settings, np.array([fit.layout.settings.tried_damping])
     width = 2.0 * settings.tried_damping
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
     found = max(_tried(fit, peaks, free), key=_chance, default=None)
     if found is None or found.chance < settings.near_chance * enough:
         return None
+    for _ in range(settings.most_trials):
+        at = found.mode[0]
+        found = max(found, *_tried(fit, _about(found, width, tried), free), key=_chance)
+        if found.mode[0] == at:
+            break
     dampings = np.geomspace(settings.damping / 4.0, settings.greatest_damping, 5)
     found = max(found, *_tried(fit, _about(found, 0.5 * width, dampings), free), key=_chance)
     if found.mode[1] == dampings[-1] or found.chance < enough:
