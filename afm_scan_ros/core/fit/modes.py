@@ -19,7 +19,6 @@ from scipy.linalg import cho_factor, cho_solve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import Mode
-from afm_scan_ros.core.types import Array
 
 
 @frozen
@@ -31,6 +30,8 @@ class FoundMode:
     gain: float
 
 
+EQUAL, HALF_OR_TWICE, NEAR = (1.0,), (0.5, 1.0, 2.0), (0.7, 0.85, 1.0, 1.2, 1.4)
+"""Dampings over that of the best mode so far: of the first climb, of the second, and at the end."""
 Place = tuple[float, float]
 """Angular frequency (rad/s) and damping."""
 Spectrum = tuple[NDArray[np.floating], NDArray[np.floating]]
@@ -66,33 +67,40 @@ def further_mode(fit: AxisFit) -> FoundMode | None:
 
 
 def _best(fit: AxisFit, free: NDArray[np.bool_], enough: float) -> FoundMode | None:
-    """Try peaks of what is left, climb from the best one, and then try dampings about the summit.
+    """Try peaks of what is left, and climb from the best one to the summit.
 
     What is explained best by the greatest damping is a bend of the response, and no mode.
     """
-    settings, tried = fit.layout.settings, np.array([fit.layout.settings.tried_damping])
+    settings = fit.layout.settings
     width = 2.0 * settings.tried_damping
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
     found = max(_tried(fit, peaks, free), key=_chance, default=None)
     if found is None or found.chance < settings.near_chance * enough:
         return None
-    for _ in range(settings.most_trials):
-        at = found.mode[0]
-        found = max(found, *_tried(fit, _about(found, width, tried), free), key=_chance)
-        if found.mode[0] == at:
-            break
-    dampings = np.geomspace(settings.damping / 4.0, settings.greatest_damping, 5)
-    found = max(found, *_tried(fit, _about(found, 0.5 * width, dampings), free), key=_chance)
-    if found.mode[1] == dampings[-1] or found.chance < enough:
+    for dampings in (EQUAL, HALF_OR_TWICE):
+        found = _climbed(fit, found, free, dampings)
+    if found.mode[1] >= settings.greatest_damping or found.chance < enough:
         return None
-    nearer = found.mode[1] * np.geomspace(0.5, 2.0, 5)
-    return max(found, *_tried(fit, _about(found, 0.15 * width, nearer), free), key=_chance)
+    return max(found, *_tried(fit, _about(found, 0.5, NEAR), free), key=_chance)
 
 
-def _about(found: FoundMode, width: float, dampings: Array) -> list[Place]:
-    """Places about a mode, within a ``width`` of the logarithm of its frequency."""
-    near = found.mode[0] * np.exp(width * np.linspace(-1.0, 1.0, 5))
-    return [(float(omega), float(damping)) for omega in near for damping in dampings]
+def _climbed(
+    fit: AxisFit, found: FoundMode, free: NDArray[np.bool_], dampings: Sequence[float]
+) -> FoundMode:
+    """Go from a mode to the best one near it, of ``dampings`` over its own, and on from there."""
+    for _ in range(fit.layout.settings.most_trials):
+        before = found
+        found = max(found, *_tried(fit, _about(found, 2.0, dampings), free), key=_chance)
+        if found is before or found.mode[1] >= fit.layout.settings.greatest_damping:
+            break
+    return found
+
+
+def _about(found: FoundMode, width: float, dampings: Sequence[float]) -> list[Place]:
+    """Places about a mode: within a ``width`` in half bandwidths, of ``dampings`` over its own."""
+    omega, damping, *_ = found.mode
+    near = omega * np.exp(width * damping * np.linspace(-1.0, 1.0, 5))
+    return [(float(at), damping * share) for at in near for share in dampings]
 
 
 def _peaks(fit: AxisFit, width: float, enough: float) -> list[float]:
