@@ -9,7 +9,7 @@ DTU 2004, algorithm 3.16, for the damping λ; M. K. Transtrum and J. P. Sethna, 
 sections 3 and 4, for the acceleration.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -26,6 +26,8 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 VIBRATION = ("lags", "modes", "sensor")
 """Groups of parameters of V and M, which can be fitted while the operator is held."""
+LINEAR = (*VIBRATION, "creep")
+"""Those, and creep's."""
 
 
 def settle(
@@ -33,18 +35,25 @@ def settle(
 ) -> None:
     """Take steps until the objective falls no more, weighing the records after each.
 
-    Where ``searching``, the scales are to stay the same too.
+    Where ``searching``, the scales are to stay the same too, or to be those of an earlier step. A
+    fit stalls where as many such steps as there may be would bring no more than is left of a fit
+    that has converged, although their damping does not fall.
     """
+    tried: list[Mapping[str, float]] = []
     for _ in range(steps):
         before, scales, near = fit.discrepancy, fit.scales, fit.converged or fit.quadratic
+        damping = fit.damping
         fell = step(fit, groups, searching=searching)
+        fit.stalled = (
+            fit.damping > 0.5 * damping and fit.layout.settings.most_steps * fell < fit.near
+        )
         fell -= fit.cover(fell)
         fit.weigh()
         heavier = max(1.0, before / fit.discrepancy) ** 2
         fit.remaining = heavier * abs(fit.remaining - fell)
-        kept = fit.scales == scales
-        chosen = not searching or (near and kept)
-        if (chosen and fit.converged) or (fell == 0.0 and kept and not fit.converged):
+        chosen = not searching or (near and fit.scales in [scales, *tried])
+        tried += [scales] if near else []
+        if chosen and (fit.converged or fit.stalled):
             break
 
 
@@ -54,15 +63,15 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     Where ``searching``, the scales of the greatest evidence are chosen first, if the last step
     showed the objective to be as quadratic as that evidence takes it to be, or had converged. A
     parameter that would fall below its lowest value stays there for this step, and so does a map
-    behind the operator that would turn back on every step. What records remember bends the
-    objective at every play that moves, so until it is nearly quadratic it is moved on its own.
+    behind the operator that would turn back on every step. What records remember is moved on its
+    own, for the objective has a corner wherever a play begins to move.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in groups or fit.layout.parts:
         free[fit.layout.parts[name]] = True
     memory = fit.layout.parts["memory"]
-    alone = free[memory].any() and not (fit.quadratic or fit.converged)
-    free[memory] &= not alone
+    alone = bool(free[memory].any())
+    free[memory] = False
     held = not free[: fit.layout.parts["map"].stop].any()
     matrix, right = fit.normal(with_operator=not held)
     if searching and (fit.quadratic or fit.converged):
@@ -71,16 +80,16 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     right -= precision @ (fit.theta - mean)
     whole = fit.layout.conditioned(matrix + precision)
     metric = _metric(fit.layout, matrix, precision)
-    equations, damping = _Equations(whole, right, free, held, metric), fit.damping
+    equations = _Equations(whole, right, free, held, metric)
     fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
     mapped = fit.layout.parts["map"]
     if fell == 0.0 and free[mapped].any():
-        free[mapped], fit.damping = False, damping
+        free[mapped] = False
         fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
-    return fell + _recall(fit) if alone else fell
+    return fell + recall(fit) if alone else fell
 
 
-def _recall(fit: AxisFit) -> float:
+def recall(fit: AxisFit) -> float:
     """Move what records remember while all else is held; return how far the objective fell."""
     free = np.zeros(fit.layout.size, bool)
     free[fit.layout.parts["memory"]] = True
@@ -160,25 +169,27 @@ class _Equations:
 def _descend(fit: AxisFit, equations: _Equations) -> float:
     """Try ever shorter steps until one descends; return how far.
 
+    Where none does, the damping stays what it was, for those of the next step are other equations.
     While the objective is as quadratic as steps take it to be, the first is tried without a bend.
     """
     settings, start = fit.layout.settings, fit.theta
     lowest, before = fit.layout.lowest() - start, fit.objective(start)
     fit.remaining = equations.foreseen(equations.move(0.0, equations.right, lowest))
-    straight, fit.quadratic, worse = fit.quadratic, False, 2.0
+    straight, fit.quadratic, worse, kept = fit.quadratic, False, 2.0, fit.damping
     for _ in range(settings.most_trials):
         move = equations.move(fit.damping, equations.right, lowest)
         theta = start + (move if straight else _bent(fit, equations, move, lowest))
         fell = before - fit.objective(theta)
         if fell > 0.0:
-            foreseen = max(equations.foreseen(move), np.finfo(float).tiny)
-            share = min(fell / foreseen, 1.0)
+            foreseen = equations.foreseen(move)
+            share = fell / foreseen if foreseen > fell else 1.0
             better = max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
             fit.damping = max(better * fit.damping, settings.least_damping)
             fit.theta, fit.quadratic = theta, fell > 0.5 * fit.remaining
             return fell
         straight = False
         fit.damping, worse = worse * fit.damping, 2.0 * worse
+    fit.damping = kept
     return 0.0
 
 

@@ -28,7 +28,7 @@ from afm_scan_ros.core.types import Array
 
 
 @frozen(eq=False)
-class _Free:
+class Free:
     """What is free in one record, as linear regressors with their prior, and their products."""
 
     columns: Array
@@ -59,7 +59,8 @@ class AxisFit:
     may still fall: what the last step left of what it would have brought, were the objective
     quadratic. ``quadratic`` is whether it nearly was. The gain stays as the first mode leaves it,
     for the operator has one. Where it ``grows``, slopes of plays are held to their least value.
-    ``damping_alone`` is that of steps of the memories alone.
+    ``stalled`` is whether steps have become too short to matter, ``damping_alone`` the damping of
+    those of the memories alone.
     """
 
     layout: Layout
@@ -70,6 +71,7 @@ class AxisFit:
     scales: dict[str, float] = field()
     remaining: float = np.inf
     quadratic: bool = False
+    stalled: bool = False
     grows: bool = False
     damping: float = field()
     damping_alone: float = 1.0
@@ -88,7 +90,12 @@ class AxisFit:
     @property
     def converged(self) -> bool:
         """Whether the parameters were within a third of their standard errors in the mean."""
-        return self.remaining < self.layout.settings.converged * self.layout.size
+        return self.remaining < self.near
+
+    @property
+    def near(self) -> float:
+        """What may remain (nat) of the objective of a fit that has converged."""
+        return self.layout.settings.converged * self.layout.size
 
     @property
     def at_noise(self) -> bool:
@@ -117,7 +124,7 @@ class AxisFit:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             left = record.mean - self.gain * simulation.response.output[record.used]
-            yield left, self._free(k).without(left)
+            yield left, self.free_of(k).without(left)
 
     def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
@@ -163,22 +170,40 @@ class AxisFit:
 
     def _normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
-        simulations = self.simulated(self.theta)
-        lefts = self.residuals(simulations)
-        for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
-            pieces = self._pieces_of(k) if with_operator else None
-            variance, size, free = self.variance(record), self.layout.size, self._free(k)
-            lost = lefts[k] / variance
-            products, share = np.zeros((size, size)), np.zeros((free.columns.shape[1], size))
-            for rows, one in jacobian(self.layout, self.theta, record, simulation, pieces):
-                live = np.flatnonzero(one.any(axis=0))
-                columns = one[:, live]
-                products[np.ix_(live, live)] += columns.T @ columns
-                right[live] += self.gain * (columns.T @ lost[rows])
-                share[:, live] += self.gain / variance * (free.columns[rows].T @ columns)
-            matrix += np.square(self.gain) / variance * products
-            matrix -= share.T @ np.linalg.solve(free.matrix, share)
+        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
+            pieces = self.columns(k, with_operator=with_operator)
+            of_record = self.products(k, left, pieces)
+            matrix += of_record[0]
+            right += of_record[1]
         return matrix, right
+
+    def products(
+        self, k: int, left: Array, pieces: Iterable[tuple[slice, Array]]
+    ) -> tuple[Array, Array]:
+        """H and g of a record of which so much is ``left`` (m), (blocks that count,).
+
+        The derivatives of ``columns`` come in pieces. What is free in the record is eliminated.
+        """
+        variance, free = self.variance(self.records[k]), self.free_of(k)
+        products, right, share = np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0))
+        for rows, one in pieces:
+            if not len(right):
+                size = one.shape[1]
+                products, right = np.zeros((size, size)), np.zeros(size)
+                share = np.zeros((free.columns.shape[1], size))
+            live = np.flatnonzero(one.any(axis=0))
+            columns = one[:, live]
+            products[np.ix_(live, live)] += columns.T @ columns
+            right[live] += columns.T @ left[rows]
+            share[:, live] += free.columns[rows].T @ columns
+        products -= share.T @ np.linalg.solve(free.matrix, share) / variance
+        return np.square(self.gain) / variance * products, self.gain / variance * right
+
+    def columns(self, k: int, *, with_operator: bool) -> Iterator[tuple[slice, Array]]:
+        """Yield ∂y/∂θ of a record for a gain of 1, piece by piece: see ``jacobian``."""
+        simulation = self.simulated(self.theta)[k]
+        pieces = self._pieces_of(k) if with_operator else None
+        return jacobian(self.layout, self.theta, self.records[k], simulation, pieces)
 
     def bent(self, move: Array, part: float, *, with_operator: bool) -> Array:
         """Right-hand side g for what the second derivative of the model adds to a move.
@@ -193,7 +218,7 @@ class AxisFit:
                 up, down, middle = (one.response.output[record.used] for one in three)
                 variance = self.variance(record)
                 added = self.gain * (2.0 * middle - up - down) / part**2
-                left = self._free(k).without(added)
+                left = self.free_of(k).without(added)
                 pieces = self._pieces_of(k) if with_operator else None
                 pull = self.gain * left / variance
                 right += pulled(self.layout, self.theta, record, here[k], pieces, pull)
@@ -268,7 +293,7 @@ class AxisFit:
         found = []
         lefts = self._without(self.simulated(self.theta))
         for k, (record, (left, _)) in enumerate(zip(self.records, lefts, strict=True)):
-            free = self._free(k)
+            free = self.free_of(k)
             weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
             sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
             found.append(tuple(zip(record.tones, map(float, sizes), strict=True)))
@@ -285,14 +310,14 @@ class AxisFit:
         for name in (*layout.operator.parts, "map", "sensor", "memory"):
             self.theta[layout.parts[name]] = theta[before[name]]
 
-    def _free(self, k: int) -> _Free:
+    def free_of(self, k: int) -> Free:
         """What is free in a record; its regressors are kept while they stay the same."""
         record, slow = self.records[k], self.layout.time_constants
         key = record.tones, tuple(slow)
         if k not in self._regressors or self._regressors[k][0] != key:
             columns = record.regressors(slow, self.layout.settings.creep)
             self._regressors[k] = key, columns, columns.T @ columns
-        return _Free(*self._regressors[k][1:], self.variance(record))
+        return Free(*self._regressors[k][1:], self.variance(record))
 
     def _pieces_of(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept.

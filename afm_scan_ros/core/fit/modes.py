@@ -1,41 +1,58 @@
 """The mode that a fit lacks: the resonance that would lower its objective most.
 
-A mode of pole p is tried with a weight κ of zero, about which the fit is linear. Were all other
-parameters θ fitted anew with it, the objective would fall by
-
-    ½ gᵀ κ,    κ = S⁻¹ g,    S = H_κκ - H_κθ H_θθ⁻¹ H_θκ,    g = b_κ - H_κθ H_θθ⁻¹ b_θ,
-
-with the normal equations' H and b. So neither plays nor lags hide a resonance by an imitation of
-it. This is Rao's score test. Source: C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50.
+What each would explain is told by Rao's score test (``score_test.py``), so neither plays nor lags
+hide a resonance by an imitation of it.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from copy import copy
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.parameters import Mode
-
-
-@frozen
-class FoundMode:
-    """A mode, by how much (nat) it lowers the objective, and the static gain over that before."""
-
-    mode: Mode
-    chance: float
-    gain: float
-
+from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.score_test import FoundMode, Place, ScoreTest
+from afm_scan_ros.core.fit.settings import FitSettings
 
 EQUAL, HALF_OR_TWICE, NEAR = (1.0,), (0.5, 1.0, 2.0), (0.7, 0.85, 1.0, 1.2, 1.4)
 """Dampings over that of the best mode so far: of the first climb, of the second, and at the end."""
-Place = tuple[float, float]
-"""Angular frequency (rad/s) and damping."""
 Spectrum = tuple[NDArray[np.floating], NDArray[np.floating]]
 """Angular frequencies (rad/s) and power over that of noise, both (n,)."""
+
+
+def add_first_mode(fit: AxisFit) -> FoundMode | None:
+    """Add the mode of the largest residuals, where they are about it rather than of the loops."""
+    found = first_mode(fit)
+    if found is not None:
+        add(fit, found)
+    return found
+
+
+def add_mode(fit: AxisFit) -> bool:
+    """Add the mode that explains most, where there is one and room for it.
+
+    Once there is a mode, none is sought where hardly more than noise is left.
+    """
+    enough = fit.layout.modes > 0 and fit.sufficient
+    if enough or fit.layout.modes == fit.layout.settings.most_modes:
+        return False
+    found = further_modes(fit)
+    for each in found:
+        add(fit, each)
+    return len(found) > 0
+
+
+def add(fit: AxisFit, found: FoundMode) -> None:
+    """Add a mode; the first one places the lags."""
+    if fit.layout.modes == 0:
+        longest = max(len(one.drive) * one.period for one in fit.records)
+        shortest = min(one.period for one in fit.records)
+        settings, omega = fit.layout.settings, found.mode[0]
+        laid = layout_of(fit.layout.operator, longest, shortest, settings, omega)
+        now = fit.layout
+        fit.lay_out(evolve(laid, unknown_starts=now.unknown_starts, sensor_order=now.sensor_order))
+    fit.add(found.mode)
 
 
 def first_mode(fit: AxisFit) -> FoundMode | None:
@@ -47,51 +64,62 @@ def first_mode(fit: AxisFit) -> FoundMode | None:
     free = np.zeros(fit.layout.size, bool)
     for name in ("lags", "creep"):
         free[fit.layout.parts[name]] = True
-    return _best(fit, free, fit.layout.settings.dominant_share * fit.misfit(fit.theta))
+    enough = fit.layout.settings.dominant_share * fit.misfit(fit.theta)
+    return next(iter(_summits(fit, free, enough, 1)), None)
 
 
-def further_mode(fit: AxisFit) -> FoundMode | None:
-    """Return the mode that explains most beside all that is fitted, None where it is little.
+def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
+    """Return the modes that explain most beside all that is fitted, from the best peaks on.
 
-    It is to be of possible weight, and to explain a share of what is left about its frequency, of
+    Each is to be of possible weight, and to explain a share of what is left about its frequency, of
     so many lines that chance does not: a resonance of any frequency explains a single one.
+    Parameters at their lowest values stay there.
     """
-    settings = fit.layout.settings
-    found = _best(fit, np.ones(fit.layout.size, bool), settings.mode_chance)
-    if found is None or np.hypot(*found.mode[2:]) > settings.heaviest_mode:
-        return None
-    misfit, lines, _ = _left_about(_spectra(fit), found.mode[0], settings.mode_band)
+    settings, spectra = fit.layout.settings, _spectra(fit)
+    free = fit.theta > fit.layout.lowest()
+    every = _summits(fit, free, settings.mode_chance, most)
+    return [one for one in every if _seen(one, spectra, settings)]
+
+
+def _seen(found: FoundMode, spectra: Sequence[Spectrum], settings: FitSettings) -> bool:
+    if np.hypot(*found.mode[2:]) > settings.heaviest_mode:
+        return False
+    misfit, lines, _ = _left_about(spectra, found.mode[0], settings.mode_band)
     share = min(found.chance / misfit, 1.0 - settings.tone_chance)
-    seen = -lines * np.log1p(-share) > settings.mode_chance
-    return found if seen and share > settings.mode_share else None
+    certain = -lines * np.log1p(-share) > settings.mode_chance
+    return bool(certain and share > settings.mode_share)
 
 
-def _best(fit: AxisFit, free: NDArray[np.bool_], enough: float) -> FoundMode | None:
-    """Try peaks of what is left, and climb from the best one to the summit.
+def _summits(
+    fit: AxisFit, free: NDArray[np.bool_], enough: float, most: int
+) -> Iterator[FoundMode]:
+    """Try peaks of what is left, and climb from the best ones to their summits.
 
     What is explained best by the greatest damping is a bend of the response, and no mode.
     """
     settings = fit.layout.settings
     width = 2.0 * settings.tried_damping
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
-    found = max(_tried(fit, peaks, free), key=_chance, default=None)
-    if found is None or found.chance < settings.near_chance * enough:
-        return None
-    for dampings in (EQUAL, HALF_OR_TWICE):
-        found = _climbed(fit, found, free, dampings)
-    if found.mode[1] >= settings.greatest_damping or found.chance < enough:
-        return None
-    return max(found, *_tried(fit, _about(found, 0.5, NEAR), free), key=_chance)
+    if not peaks:
+        return
+    test = ScoreTest(fit, free)
+    for start in sorted(test.of(peaks), key=_chance, reverse=True)[:most]:
+        found = start
+        if found.chance < settings.near_chance * enough:
+            return
+        for dampings in (EQUAL, HALF_OR_TWICE):
+            found = _climbed(test, found, dampings)
+        if found.mode[1] < settings.greatest_damping and found.chance >= enough:
+            yield max(found, *test.of(_about(found, 0.5, NEAR)), key=_chance)
 
 
-def _climbed(
-    fit: AxisFit, found: FoundMode, free: NDArray[np.bool_], dampings: Sequence[float]
-) -> FoundMode:
+def _climbed(test: ScoreTest, found: FoundMode, dampings: Sequence[float]) -> FoundMode:
     """Go from a mode to the best one near it, of ``dampings`` over its own, and on from there."""
-    for _ in range(fit.layout.settings.most_trials):
+    settings = test.fit.layout.settings
+    for _ in range(settings.most_trials):
         before = found
-        found = max(found, *_tried(fit, _about(found, 2.0, dampings), free), key=_chance)
-        if found is before or found.mode[1] >= fit.layout.settings.greatest_damping:
+        found = max(found, *test.of(_about(found, 2.0, dampings)), key=_chance)
+        if found is before or found.mode[1] >= settings.greatest_damping:
             break
     return found
 
@@ -135,44 +163,6 @@ def _band(fit: AxisFit) -> tuple[float, float]:
         first = min(omega for omega, *_ in fit.layout.of_modes(fit.theta))
         lowest = max(lowest, first / settings.slowest_lag)
     return lowest, 0.8 * np.pi / min(one.length for one in fit.records)
-
-
-def _tried(fit: AxisFit, places: Sequence[Place], free: NDArray[np.bool_]) -> Iterator[FoundMode]:
-    """Yield what each mode explains, the ``free`` parameters (size,) of the fit being fitted.
-
-    So many are tried at a time as memory holds derivatives of.
-    """
-    blocks, settings = max(one.blocks for one in fit.records), fit.layout.settings
-    at_once = max(settings.mode_values // blocks, 1)
-    for first in range(0, len(places), at_once):
-        yield from _tried_at_once(fit, places[first : first + at_once], free)
-
-
-def _tried_at_once(
-    fit: AxisFit, places: Sequence[Place], free: NDArray[np.bool_]
-) -> Iterator[FoundMode]:
-    wider, layout, last = copy(fit), fit.layout, fit.layout.parts["modes"].stop
-    for omega, damping in places:
-        wider.add((omega, damping, 0.0, 0.0))
-    matrix, right = wider.normal(with_operator=bool(free[0]))
-    precision, mean = wider.layout.prior(fit.scales, wider.theta)
-    right -= precision @ (wider.theta - mean)
-    if not free[0]:
-        precision = wider.layout.of_any_gain(precision)
-    whole = wider.layout.conditioned(matrix + precision)
-    behind = np.arange(last, layout.size) + 4 * len(places)
-    kept = np.concatenate([np.arange(last), behind])[free]
-    factor = cho_factor(whole[np.ix_(kept, kept)])
-    alone, static = cho_solve(factor, right[kept]), layout.static[free]
-    for k, (omega, damping) in enumerate(places):
-        weights = last + 4 * k + np.array([2, 3])
-        shared = whole[np.ix_(kept, weights)]
-        along = cho_solve(factor, shared)
-        pull = right[weights] - shared.T @ alone
-        pair = np.linalg.solve(whole[np.ix_(weights, weights)] - shared.T @ along, pull)
-        gain = 1.0 if free[0] else float(1.0 + pair[0] + static @ (alone - along @ pair))
-        mode = omega, damping, float(pair[0]) / gain, float(pair[1]) / gain
-        yield FoundMode(mode, 0.5 * float(pull @ pair), gain)
 
 
 def _spectra(fit: AxisFit) -> list[Spectrum]:

@@ -49,7 +49,7 @@ def jacobian(
     """
     parts, used = layout.parts, record.used
     vibration = slice(parts["lags"].start, parts["modes"].stop)
-    moved, late = _of_vibration(layout, theta, record, simulation), simulation.response.late
+    moved, late = of_vibration(layout, theta, record, simulation), simulation.response.late
     corner = _of_sensor(layout, theta, record, simulation)
     memory, count = layout.memory_part(record), 0 if pieces is None else parts["map"].stop
     first = 0
@@ -83,7 +83,7 @@ def pulled(
     whole[record.used] = pull
     result = np.zeros(layout.size)
     vibration = slice(parts["lags"].start, parts["modes"].stop)
-    result[vibration] = whole @ _of_vibration(layout, theta, record, simulation)
+    result[vibration] = whole @ of_vibration(layout, theta, record, simulation)
     result[parts["creep"]] = whole @ simulation.response.late
     result[parts["sensor"]] = whole @ _of_sensor(layout, theta, record, simulation)
     if pieces is not None:
@@ -167,7 +167,7 @@ def _by_rest(layout: Layout, theta: Array) -> Array:
     return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
 
 
-def _of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
+def of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
     """Derivatives by the weights of the lags, and by what θ holds of each mode."""
     dynamics = simulation.dynamics
     modes, changes, lags = dynamics.seen(simulation.response)

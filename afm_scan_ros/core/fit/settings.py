@@ -142,10 +142,10 @@ class FitSettings:
         "slopes are of order 1",
     )
     creep: float = setting(
-        0.03,
+        0.015,
         "1",
         "greatest standard deviation of the second differences of creep's gains",
-        "creep is 1 to 10 % a decade, of four time constants",
+        "creep is 1 to 10 % a decade, of eight time constants",
     )
     first_scale: float = setting(
         0.1,
@@ -196,10 +196,10 @@ class FitSettings:
         "a decade above the lags",
     )
     creep_per_decade: int = setting(
-        4,
+        8,
         "1",
         "time constants of creep in a decade",
-        "half as many leave gain errors of 1 to 2 %",
+        "one between two of them is then imitated to 0.5 % of its gain",
     )
     damping: float = setting(
         0.02,
@@ -242,6 +242,12 @@ class FitSettings:
         "1",
         "peaks of what is left about which a mode is tried",
         "harmonics of a periodic drive are peaks too",
+    )
+    tried_modes: int = setting(
+        4,
+        "1",
+        "modes that are fitted in turn beside a sensor's low-pass, of which the best stays",
+        "the low-pass begins far from its corner, so what is left tells little of a resonance",
     )
     mode_values: int = setting(
         10_000_000,

@@ -5,7 +5,8 @@ import pytest
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.axis import fit_axis, with_one_state
+from afm_scan_ros.core.fit.alternatives import with_one_state
+from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.evidence import evidence, first_scales

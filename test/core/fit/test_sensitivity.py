@@ -76,8 +76,8 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, sta
         up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
         slope = (up.response.output - down.response.output)[one.used] / 2e-5
         motion = float(np.linalg.norm(slope)) + 1e-6
-        close = 0.002 if block == 1 else 0.2  # blocks hold the input of the filters
-        assert np.linalg.norm(slope - found[:, place]) < close * motion + 1e-5, place
+        close = 0.003 if block == 1 else 0.2  # blocks hold the input of the filters
+        assert np.linalg.norm(slope - found[:, place]) < close * motion + 5e-5, place
 
 
 @pytest.mark.parametrize("start", STARTS)

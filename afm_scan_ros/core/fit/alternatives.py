@@ -1,0 +1,206 @@
+"""Fits that compete with that by plays: by another operator, another sensor, another start."""
+
+from collections.abc import Callable
+from copy import copy
+from functools import partial
+
+import numpy as np
+from attrs import evolve
+
+from afm_scan_ros.core.effects.sensor import SensorModel
+from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.fit import sensitivity
+from afm_scan_ros.core.fit.descent import LINEAR, settle
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.score_test import FoundMode
+from afm_scan_ros.core.fit.signals import averaged, correlation_length
+from afm_scan_ros.core.fit.starts import at_rest, counted_from_rest
+from afm_scan_ros.core.types import ProgressCallback
+
+
+def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return the fit by plays, the paper's operator, or by what has clearly the greater evidence.
+
+    That is an operator of one state, a sensor with a low-pass of its own, or both, and a start at
+    rest. Nothing else is tried where hardly more than the sensor's noise is left.
+    """
+    fit = _with_any_sensor(fit, progress)
+    resting = _with_rest(fit, progress)
+    if resting is not fit:
+        fit = _with_any_sensor(counted_from_rest(resting), progress)
+    if fit.sufficient:
+        progress("hardly more than noise is left")
+        return fit
+    progress("fitting the hysteresis by one state")
+    other = _preferred(fit, partial(with_one_state, fit), progress, "one state")
+    if other is fit:
+        return fit
+    while add_mode(other):
+        settle(other, other.layout.settings.most_steps, searching=True)
+    return _with_any_sensor(other, progress)
+
+
+def _with_rest(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return a fit in which records began at rest where that has clearly the greater evidence.
+
+    All of unknown start are tried at once, and otherwise those one by one whose memory is
+    estimated.
+    """
+    unknown = [k for k, record in enumerate(fit.records) if not record.rested]
+    estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
+    for some in [unknown, *([k] for k in estimated if len(unknown) > 1)]:
+        if not some or fit.at_noise or any(fit.records[k].rested for k in some):
+            break
+        name = f"rest before {', '.join(fit.records[k].name for k in some)}"
+        fit = _preferred(fit, partial(at_rest, fit, some), progress, name)
+    return fit
+
+
+def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return a fit, or one with a low-pass of the sensor that has clearly the greater evidence.
+
+    A steeper one is tried where the last was better, and not enough. None is where only noise is
+    left: what a low-pass leaves of slow records is slight, and large at other rates.
+    """
+    for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
+        if fit.at_noise:
+            break
+        before, name = fit, f"a sensor's low-pass of order {order}"
+        fit = _preferred(fit, partial(with_sensor, fit, order), progress, name)
+        if fit is before:
+            break
+    return fit
+
+
+def _preferred(
+    fit: AxisFit,
+    changed: Callable[[], AxisFit | None],
+    progress: ProgressCallback,
+    name: str,
+) -> AxisFit:
+    """Return a fit, or a changed one that has clearly the greater evidence.
+
+    The evidence is that of independent residuals, so the lead is divided by their correlation
+    length, and has to be as clear as a mode's. A fit that diverges is none of the scanner's.
+    """
+    try:
+        other = changed()
+        if other is None:
+            return fit
+        lead = _lead(fit, other)
+        if lead > 0.0:
+            settle(other, other.layout.settings.most_steps, searching=True)
+            lead = other.evidence() - fit.evidence()
+    except ScanError as error:
+        progress(f"{name}: {error}")
+        return fit
+    lead /= _longest_correlation(other)
+    progress(f"{name} has {lead:.3g} nat more evidence")
+    return other if lead > other.layout.settings.mode_chance else fit
+
+
+def _longest_correlation(fit: AxisFit) -> float:
+    """Blocks of the most correlated residual that tell as much as one independent block."""
+    return max(map(correlation_length, fit.residuals(fit.simulated(fit.theta))))
+
+
+def _lead(fit: AxisFit, other: AxisFit) -> float:
+    """By how much (nat) another fit has the greater evidence.
+
+    Both take steps in turn until they converge or stall, or what may remain of the objective of
+    either would hardly change whether that lead is clear.
+    """
+    settings, lead = fit.layout.settings, 0.0
+    for _ in range(settings.most_steps // settings.stage_steps):
+        for each in (fit, other):
+            settle(each, settings.stage_steps, searching=True)
+        lead = other.evidence() - fit.evidence()
+        beyond = lead - settings.mode_chance * _longest_correlation(other)
+        remaining = fit.remaining if beyond > 0.0 else other.remaining
+        decided = abs(beyond) > settings.decided * remaining
+        if decided or all(each.converged or each.stalled for each in (fit, other)):
+            break
+    return lead
+
+
+def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
+    """Return the fit with a sensor's low-pass that lags as much as its vibration as read does.
+
+    It takes the place of the lags. Where the fit has no mode, one that the sensor hid is sought.
+    Returns None where nothing lags, or where the low-pass explains hardly anything of what is left
+    while the operator is held.
+    """
+    settings, read = fit.layout.settings, fit.layout.dynamics(fit.theta).read()
+    unit = SensorModel(order, 1.0)
+    lag, of_unit = (-float(np.sum((b.weights / b.poles).real)) for b in (read, unit))
+    corner = of_unit / max(lag, np.finfo(float).tiny)
+    if corner > 0.5 / min(one.period for one in fit.records):
+        return None
+    laid = evolve(fit.layout, sensor_order=order)
+    other = AxisFit(laid, list(fit.records), fit.gain, laid.start(), fit.discrepancy)
+    for name in (*fit.layout.operator.parts, "map", "modes", "creep", "memory"):
+        other.theta[laid.parts[name]] = fit.theta[fit.layout.parts[name]]
+    other.theta[laid.parts["lags"].start] = 1.0 - sum(mode[2] for mode in laid.of_modes(fit.theta))
+    other.theta[laid.parts["sensor"]] = np.log(corner)
+    other.weigh()
+    settle(other, settings.most_steps, LINEAR)
+    if laid.modes == 0:
+        every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
+        other = min([other, *every], key=lambda each: each.discrepancy)
+    left = (other.discrepancy / fit.discrepancy) ** 2
+    return other if left < 1.0 - settings.mode_share else None
+
+
+def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:
+    """Return a fit without modes with one, its operator held.
+
+    Where that mode moves farther than lags lie apart, they and creep were placed for another, and
+    it is added once more.
+    """
+    other = _held_with(fit, found)
+    again = evolve(found, mode=other.layout.of_modes(other.theta)[0])
+    apart = np.log(other.layout.lags[-1] / other.layout.lags[-2])
+    if abs(np.log(again.mode[0] / found.mode[0])) > apart:
+        other = min(other, _held_with(fit, again), key=lambda each: each.discrepancy)
+    return other
+
+
+def _held_with(fit: AxisFit, found: FoundMode) -> AxisFit:
+    other = copy(fit)
+    other.records = list(fit.records)
+    add(other, found)
+    settle(other, fit.layout.settings.most_steps, LINEAR)
+    return other
+
+
+def with_one_state(fit: AxisFit) -> AxisFit:
+    """Return the fit with the operator of one state that follows its F best.
+
+    What vibrates is sought anew: it may have taken what plays cannot do.
+    """
+    layout, paths, rest = fit.layout, [], sensitivity.at_rest(fit.layout, fit.theta)
+    for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
+        output = simulation.effective - rest
+        paths.append((averaged(record.drive, record.block), averaged(output, record.block)))
+    low = min(float((output - drive).min()) for drive, output in paths)
+    high = max(float((output - drive).max()) for drive, output in paths)
+    margin = (
+        layout.settings.state_margin * (high - low) + np.finfo(float).eps * layout.operator.half
+    )
+    widths = low - margin, high + margin
+    operator = OneState(layout.operator.lower, layout.operator.upper, widths, layout.settings)
+    linear = fit.theta[layout.parts["lags"].start : layout.parts["memory"].start]
+    begun = np.array([output[0] - drive[0] for drive, output in paths])
+    memory = begun[[one.unknown is not None for one in fit.records]]
+    starts = [np.concatenate([one, linear, memory]) for one in operator.started(paths)]
+    other = AxisFit(
+        evolve(layout, operator=operator), list(fit.records), fit.gain, starts[0], fit.discrepancy
+    )
+    other.theta = min(starts, key=other.objective)
+    other.lay_out(evolve(other.layout, modes=0))
+    other.weigh()
+    while (other.layout.modes == 0 and add_first_mode(other)) or add_mode(other):
+        settle(other, layout.settings.most_steps, LINEAR)
+    return other

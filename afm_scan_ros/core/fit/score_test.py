@@ -1,0 +1,119 @@
+"""What a mode would explain that a fit lacks: Rao's score test.
+
+A mode of pole p is tried with a weight κ of zero, about which the fit is linear. Were all other
+parameters θ fitted anew with it, the objective would fall by
+
+    ½ gᵀ κ,    κ = S⁻¹ g,    S = H_κκ - H_κθ H_θθ⁻¹ H_θκ,    g = b_κ - H_κθ H_θθ⁻¹ b_θ,
+
+with the normal equations' H and b. The derivatives by θ are made once for all modes.
+Source: C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50.
+"""
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from typing import TypeAlias
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.parameters import Mode
+from afm_scan_ros.core.fit.sensitivity import of_vibration
+from afm_scan_ros.core.types import Array
+
+Place: TypeAlias = tuple[float, float]
+"""Angular frequency (rad/s) and damping."""
+
+
+@frozen
+class FoundMode:
+    """A mode, by how much (nat) it lowers the objective, and the static gain over that before."""
+
+    mode: Mode
+    chance: float
+    gain: float
+
+
+class ScoreTest:
+    """A test of modes beside the ``free`` parameters (size,) of a fit, which are fitted anew."""
+
+    def __init__(self, fit: AxisFit, free: NDArray[np.bool_]) -> None:
+        self.fit, self.free = fit, np.flatnonzero(free)
+        self.with_operator = bool(free[: fit.layout.parts["map"].stop].any())
+        self._left = fit.residuals(fit.simulated(fit.theta))
+        self._columns = [
+            [
+                (rows, one[:, self.free].astype(np.float32))
+                for rows, one in fit.columns(k, with_operator=self.with_operator)
+            ]
+            for k in range(len(fit.records))
+        ]
+        self._matrix, self._right = np.zeros((len(self.free),) * 2), np.zeros(len(self.free))
+        for k, left in enumerate(self._left):
+            matrix, right = fit.products(k, left, self._pieces(k))
+            self._matrix += matrix
+            self._right += right
+
+    def _pieces(self, k: int) -> Iterator[tuple[slice, Array]]:
+        """Derivatives of a record by what is free, in double precision again.
+
+        All products are of the same rounded derivatives, for what a mode explains beyond all that
+        imitates it is a small difference.
+        """
+        for rows, one in self._columns[k]:
+            yield rows, one.astype(float)
+
+    def of(self, places: Sequence[Place]) -> Iterator[FoundMode]:
+        """Yield what each mode explains; so many are tried at a time as memory holds."""
+        blocks = max(one.blocks for one in self.fit.records)
+        at_once = max(self.fit.layout.settings.mode_values // blocks, 1)
+        for first in range(0, len(places), at_once):
+            yield from self._of(places[first : first + at_once])
+
+    def _of(self, places: Sequence[Place]) -> Iterator[FoundMode]:
+        fit, layout, kept = self.fit, self.fit.layout, self.free
+        wider = copy(fit)
+        for omega, damping in places:
+            wider.add((omega, damping, 0.0, 0.0))
+        last = layout.parts["modes"].stop
+        weights = last + (4 * np.arange(len(places))[:, np.newaxis] + [2, 3]).ravel()
+        own, shared, pull = self._products(wider, weights)
+        places_of = np.where(kept < last, kept, kept + 4 * len(places))
+        precision, mean = wider.layout.prior(fit.scales, wider.theta)
+        apart = precision @ (wider.theta - mean)
+        if not self.with_operator:
+            precision = wider.layout.of_any_gain(precision)
+        whole = self._matrix + precision[np.ix_(places_of, places_of)]
+        factor = cho_factor(layout.conditioned(whole))
+        shared = shared + precision[np.ix_(places_of, weights)]
+        own = layout.conditioned(own + precision[np.ix_(weights, weights)])
+        alone = cho_solve(factor, self._right - apart[places_of])
+        along = cho_solve(factor, shared)
+        pull = pull - apart[weights] - shared.T @ alone
+        within, static = own - shared.T @ along, layout.static[kept]
+        for k, (omega, damping) in enumerate(places):
+            both = slice(2 * k, 2 * k + 2)
+            pair = np.linalg.solve(within[both, both], pull[both])
+            gain = 1.0
+            if not self.with_operator:
+                gain = float(1.0 + pair[0] + static @ (alone - along[:, both] @ pair))
+            mode = omega, damping, float(pair[0]) / gain, float(pair[1]) / gain
+            yield FoundMode(mode, 0.5 * float(pull[both] @ pair), gain)
+
+    def _products(self, wider: AxisFit, weights: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """H_κκ, H_θκ and b_κ of the weights at some places of a wider θ."""
+        fit, at = self.fit, weights - wider.layout.parts["lags"].start
+        own, shared = np.zeros((len(at), len(at))), np.zeros((len(self.free), len(at)))
+        pull, simulations = np.zeros(len(at)), wider.simulated(wider.theta)
+        for k, (record, simulation) in enumerate(zip(fit.records, simulations, strict=True)):
+            given = wider.layout, wider.theta, record, simulation
+            columns = fit.gain * of_vibration(*given)[record.used][:, at]
+            free, variance = fit.free_of(k), fit.variance(record)
+            alone = free.without(columns) / variance
+            own += columns.T @ alone
+            pull += columns.T @ self._left[k] / variance
+            for rows, one in self._pieces(k):
+                shared += fit.gain * (one.T @ alone[rows])
+        return own, shared, pull
