@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from copy import copy
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve
@@ -18,6 +19,9 @@ from afm_scan_ros.core.fit.score_test import FoundMode
 from afm_scan_ros.core.fit.signals import averaged, correlation_length
 from afm_scan_ros.core.fit.starts import at_rest, counted_from_rest
 from afm_scan_ros.core.types import ProgressCallback
+
+Changed: TypeAlias = Callable[[], AxisFit | None]
+"""Makes another fit, where there is one."""
 
 
 def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
@@ -45,16 +49,20 @@ def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
 def _with_rest(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit in which records began at rest where that has clearly the greater evidence.
 
-    All of unknown start are tried at once, and otherwise those one by one whose memory is
-    estimated.
+    All of unknown start are tried at once, and where these clearly did not all rest, those one by
+    one whose memory is estimated.
     """
     unknown = [k for k, record in enumerate(fit.records) if not record.rested]
     estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
-    for some in [unknown, *([k] for k in estimated if len(unknown) > 1)]:
-        if not some or fit.at_noise or any(fit.records[k].rested for k in some):
-            break
-        name = f"rest before {', '.join(fit.records[k].name for k in some)}"
-        fit = _preferred(fit, partial(at_rest, fit, some), progress, name)
+    if fit.at_noise or not unknown:
+        return fit
+    resting, lead = _compared(fit, partial(at_rest, fit, unknown), progress, "rest before records")
+    clear = fit.layout.settings.mode_chance
+    if lead > clear:
+        return resting
+    for k in estimated if len(unknown) > 1 and lead < -clear else []:
+        name = f"rest before {fit.records[k].name}"
+        fit = _preferred(fit, partial(at_rest, fit, [k]), progress, name)
     return fit
 
 
@@ -74,31 +82,34 @@ def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     return fit
 
 
-def _preferred(
-    fit: AxisFit,
-    changed: Callable[[], AxisFit | None],
-    progress: ProgressCallback,
-    name: str,
-) -> AxisFit:
-    """Return a fit, or a changed one that has clearly the greater evidence.
+def _preferred(fit: AxisFit, changed: Changed, progress: ProgressCallback, name: str) -> AxisFit:
+    """Return a fit, or a changed one whose evidence leads by as much as a mode has to explain."""
+    other, lead = _compared(fit, changed, progress, name)
+    return other if lead > fit.layout.settings.mode_chance else fit
+
+
+def _compared(
+    fit: AxisFit, changed: Changed, progress: ProgressCallback, name: str
+) -> tuple[AxisFit, float]:
+    """Return a changed fit and by how much its evidence leads (nat).
 
     The evidence is that of independent residuals, so the lead is divided by their correlation
-    length, and has to be as clear as a mode's. A fit that diverges is none of the scanner's.
+    length. A fit that diverges is none of the scanner's, and none leads where there is none.
     """
     try:
         other = changed()
         if other is None:
-            return fit
+            return fit, -np.inf
         lead = _lead(fit, other)
         if lead > 0.0:
             settle(other, other.layout.settings.most_steps, searching=True)
             lead = other.evidence() - fit.evidence()
     except ScanError as error:
         progress(f"{name}: {error}")
-        return fit
+        return fit, -np.inf
     lead /= _longest_correlation(other)
     progress(f"{name} has {lead:.3g} nat more evidence")
-    return other if lead > other.layout.settings.mode_chance else fit
+    return other, lead
 
 
 def _longest_correlation(fit: AxisFit) -> float:

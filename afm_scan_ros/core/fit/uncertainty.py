@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from attrs import frozen
 from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import welch
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.estimator import AxisFit
@@ -30,11 +31,24 @@ class PredictedMotion:
 
 
 def information(fit: AxisFit) -> Array:
-    """H of the normal equations, as if samples whose residuals are correlated were one sample."""
-    residuals = fit.residuals(fit.simulated(fit.theta))
-    lengths = [correlation_length(one) for one in residuals]
-    matrix, _ = fit.normal(with_operator=True)
-    return matrix / float(np.average(lengths, weights=[len(one) for one in residuals]))
+    """H of the normal equations, as if samples whose residuals are alike were one sample."""
+    lefts = fit.residuals(fit.simulated(fit.theta))
+    matrix = np.zeros((fit.layout.size,) * 2)
+    for k, left in enumerate(lefts):
+        of_record, _ = fit.products(k, left, fit.columns(k, with_operator=True))
+        matrix += of_record / samples_alike(left)
+    return matrix
+
+
+def samples_alike(left: Array) -> float:
+    """Samples of a residual (n,) that tell as much as one independent sample.
+
+    That is its spectral density over the mean density, where a parameter is told: that of the
+    slowest parameters is at frequency zero, which gives the correlation length, and that of others
+    where the residual itself is, as about a resonance, which gives the mean of the squared density.
+    """
+    _, density = welch(left, nperseg=min(len(left), max(len(left) // 16, 256)))
+    return max(correlation_length(left), float(np.mean(density**2) / np.mean(density) ** 2))
 
 
 def covariance(fit: AxisFit) -> Array:
