@@ -105,8 +105,8 @@ class PoleBank:
         )
 
     def creep(self) -> CreepModel:
-        """C(s), without the time constants that have no gain."""
-        some = self.gains != 0.0
+        """C(s), without the time constants that have no gain, or one of rounding."""
+        some = self.gains > np.finfo(np.float32).eps * self.gains.sum()
         return CreepModel(tuple(self.gains[some]), tuple(self.time_constants[some]))
 
 
