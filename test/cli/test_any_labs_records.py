@@ -64,7 +64,7 @@ def ramps(levels: list[float], seconds: float) -> Array:
 
 def waves(highest: float, period: float) -> Array:
     """Four multisines up to ``highest`` Hz, of four periods each, as converters loop them."""
-    rng, length = np.random.default_rng(RNG), round(0.5 / period)
+    rng, length = np.random.default_rng(RNG), round(500.0 / highest / period)
     lines = np.zeros((4, length // 2 + 1), dtype=complex)
     tones = np.arange(1, int(highest * length * period) + 1)
     sizes = np.minimum(1.0, 50.0 / tones)
