@@ -9,6 +9,7 @@ from scipy import signal
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import first_mode, further_modes
+from afm_scan_ros.core.fit.score_test import ScoreTest
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     CREEP,
@@ -98,6 +99,22 @@ def test_neither_plays_nor_lags_hide_a_mode() -> None:
     found = next(iter(further_modes(fit)), None)
     assert found is not None
     assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.05)
+
+
+def test_no_mode_explains_more_than_is_left_whatever_is_tried_beside_it() -> None:
+    """What a mode explains beyond its imitation is a small difference of large products."""
+    cycles = np.interp(np.arange(12_000) % 1000, [0, 500, 1000], [0.0, 1.0, 0.0])
+    drive = cycles * np.linspace(4.0, 1.0, len(cycles))
+    fit = AxisFit(*of_plays_alone(drive, record(of_plays, drive).displacement[:, 0]))
+    settle(fit, 20, searching=True)
+    free = fit.theta > fit.layout.lowest()
+    test, left = ScoreTest(fit, free), fit.misfit(fit.theta)
+    places = [(2.0 * np.pi * FREQUENCY * share, 0.06) for share in (0.8, 0.9, 1.0, 1.1, 1.2)]
+    together = list(test.of(places))
+    for place, beside in zip(places, together, strict=True):
+        (alone,) = test.of([place])
+        assert beside.chance == pytest.approx(alone.chance, rel=0.02, abs=0.1)
+        assert alone.chance < 1.02 * left + fit.near
 
 
 def test_a_bend_of_the_response_is_no_mode() -> None:

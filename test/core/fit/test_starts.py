@@ -1,0 +1,51 @@
+"""Records that began at depolarised rest although nobody states it."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.starts import at_rest, counted_from_rest
+from helpers.fit_cases import GAIN, displaced, levels, of_plays, of_plays_alone, record
+
+
+def three_unknown_starts() -> AxisFit:
+    drive = levels(1, 14, 300)
+    layout, (one,), gain, _ = of_plays_alone(drive, GAIN * drive)
+    layout = evolve(layout, unknown_starts=3)
+    records = [evolve(one, rested=False, unknown=k, first=100) for k in range(3)]
+    theta = layout.start()
+    theta[layout.parts["memory"]] = np.arange(3.0 * layout.operator.unknowns)
+    return AxisFit(layout, records, gain, theta)
+
+
+def test_the_others_keep_what_they_remember() -> None:
+    fit = three_unknown_starts()
+    found = at_rest(fit, [1])
+    assert [one.rested for one in found.records] == [False, True, False]
+    assert found.layout.size == fit.layout.size - fit.layout.operator.unknowns
+    for k in (0, 2):
+        before = fit.layout.memory_of(fit.theta, fit.records[k])
+        after = found.layout.memory_of(found.theta, found.records[k])
+        np.testing.assert_array_equal(after, before)
+    assert found.layout.memory_of(found.theta, found.records[1]) is None
+
+
+def test_a_record_counts_from_rest_on() -> None:
+    found = counted_from_rest(at_rest(three_unknown_starts(), [0, 2]))
+    assert [one.first for one in found.records] == [0, 100, 0]
+
+
+@pytest.mark.parametrize("rested", [True, False])
+def test_a_first_step_from_rest_is_told_from_a_start_in_use(*, rested: bool) -> None:
+    """A scanner at rest rings and creeps after the first sample, one in use had settled there."""
+    drive = levels(2, 14, 400)[600:]
+    assert abs(drive[0]) > 0.5
+    moved = record(of_plays, drive)
+    if not rested:
+        used = np.concatenate([levels(4, 14, 600), np.full(20_000, drive[0])])
+        whole = displaced(of_plays, np.concatenate([used, drive]))
+        moved = evolve(moved, displacement=whole[len(used) :, np.newaxis])
+    fit = fit_axis([evolve(moved, start="unknown")], moved.axes[0])
+    assert fit.records[0].rested == rested
