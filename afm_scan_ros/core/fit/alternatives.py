@@ -10,14 +10,14 @@ from attrs import evolve
 
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.fit import sensitivity
 from afm_scan_ros.core.fit.descent import LINEAR, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
+from afm_scan_ros.core.fit.sensitivity import at_rest
 from afm_scan_ros.core.fit.signals import averaged, correlation_length
-from afm_scan_ros.core.fit.starts import at_rest, counted_from_rest
+from afm_scan_ros.core.fit.starts import begun_at_rest, counted_from_rest
 from afm_scan_ros.core.types import ProgressCallback
 
 Changed: TypeAlias = Callable[[], AxisFit | None]
@@ -56,13 +56,14 @@ def _with_rest(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
     if fit.at_noise or not unknown:
         return fit
-    resting, lead = _compared(fit, partial(at_rest, fit, unknown), progress, "rest before records")
+    name = "rest before all records"
+    resting, lead = _compared(fit, partial(begun_at_rest, fit, unknown), progress, name)
     clear = fit.layout.settings.mode_chance
     if lead > clear:
         return resting
     for k in estimated if len(unknown) > 1 and lead < -clear else []:
         name = f"rest before {fit.records[k].name}"
-        fit = _preferred(fit, partial(at_rest, fit, [k]), progress, name)
+        fit = _preferred(fit, partial(begun_at_rest, fit, [k]), progress, name)
     return fit
 
 
@@ -165,7 +166,7 @@ def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
 
 
 def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:
-    """Return a fit without modes with one, its operator held.
+    """Add a first mode to a fit, and refit all but its operator; return the result.
 
     Where that mode moves farther than lags lie apart, they and creep were placed for another, and
     it is added once more.
@@ -179,6 +180,7 @@ def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:
 
 
 def _held_with(fit: AxisFit, found: FoundMode) -> AxisFit:
+    """Return a fit of the same records with a mode, after steps of all but its operator."""
     other = copy(fit)
     other.records = list(fit.records)
     add(other, found)
@@ -191,7 +193,7 @@ def with_one_state(fit: AxisFit) -> AxisFit:
 
     What vibrates is sought anew: it may have taken what plays cannot do.
     """
-    layout, paths, rest = fit.layout, [], sensitivity.at_rest(fit.layout, fit.theta)
+    layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
     for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
         output = simulation.effective - rest
         paths.append((averaged(record.drive, record.block), averaged(output, record.block)))

@@ -80,22 +80,22 @@ class ScoreTest:
         last = layout.parts["modes"].stop
         weights = last + (4 * np.arange(len(places))[:, np.newaxis] + [2, 3]).ravel()
         own, shared, pull = self._products(wider, weights)
-        places_of = np.where(kept < last, kept, kept + 4 * len(places))
+        within_wider = np.where(kept < last, kept, kept + 4 * len(places))
         precision, mean = wider.layout.prior(fit.scales, wider.theta)
         apart = precision @ (wider.theta - mean)
         if not self.with_operator:
             precision = wider.layout.of_any_gain(precision)
-        whole = self._matrix + precision[np.ix_(places_of, places_of)]
+        whole = self._matrix + precision[np.ix_(within_wider, within_wider)]
         factor = cho_factor(layout.conditioned(whole))
-        shared = shared + precision[np.ix_(places_of, weights)]
+        shared = shared + precision[np.ix_(within_wider, weights)]
         own = layout.conditioned(own + precision[np.ix_(weights, weights)])
-        alone = cho_solve(factor, self._right - apart[places_of])
+        alone = cho_solve(factor, self._right - apart[within_wider])
         along = cho_solve(factor, shared)
         pull = pull - apart[weights] - shared.T @ alone
-        within, static = own - shared.T @ along, layout.static[kept]
+        beyond, static = own - shared.T @ along, layout.static[kept]
         for k, (omega, damping) in enumerate(places):
             both = slice(2 * k, 2 * k + 2)
-            pair = np.linalg.solve(within[both, both], pull[both])
+            pair = np.linalg.solve(beyond[both, both], pull[both])
             gain = 1.0
             if not self.with_operator:
                 gain = float(1.0 + pair[0] + static @ (alone - along[:, both] @ pair))

@@ -243,6 +243,12 @@ class FitSettings:
         "peaks of what is left about which a mode is tried",
         "harmonics of a periodic drive are peaks too",
     )
+    residual_segments: int = setting(
+        16,
+        "1",
+        "segments of a residual over which its spectral density is averaged",
+        "half overlapping, they leave a fifth of the density to chance",
+    )
     tried_modes: int = setting(
         4,
         "1",

@@ -8,7 +8,7 @@ from attrs import evolve
 from afm_scan_ros.core.fit.estimator import AxisFit
 
 
-def at_rest(fit: AxisFit, places: Collection[int]) -> AxisFit:
+def begun_at_rest(fit: AxisFit, places: Collection[int]) -> AxisFit:
     """Return a fit in which some records rested before their first sample, at 0 V.
 
     They remember nothing then, and no creep goes on in them.

@@ -36,18 +36,19 @@ def information(fit: AxisFit) -> Array:
     matrix = np.zeros((fit.layout.size,) * 2)
     for k, left in enumerate(lefts):
         of_record, _ = fit.products(k, left, fit.columns(k, with_operator=True))
-        matrix += of_record / samples_alike(left)
+        matrix += of_record / samples_alike(left, fit.layout.settings.residual_segments)
     return matrix
 
 
-def samples_alike(left: Array) -> float:
+def samples_alike(left: Array, segments: int) -> float:
     """Samples of a residual (n,) that tell as much as one independent sample.
 
     That is its spectral density over the mean density, where a parameter is told: that of the
     slowest parameters is at frequency zero, which gives the correlation length, and that of others
     where the residual itself is, as about a resonance, which gives the mean of the squared density.
+    The density is averaged over so many segments.
     """
-    _, density = welch(left, nperseg=min(len(left), max(len(left) // 16, 256)))
+    _, density = welch(left, nperseg=-(-len(left) // segments))
     return max(correlation_length(left), float(np.mean(density**2) / np.mean(density) ** 2))
 
 

@@ -6,7 +6,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.starts import at_rest, counted_from_rest
+from afm_scan_ros.core.fit.starts import begun_at_rest, counted_from_rest
 from helpers.fit_cases import GAIN, displaced, levels, of_plays, of_plays_alone, record
 
 
@@ -22,7 +22,7 @@ def three_unknown_starts() -> AxisFit:
 
 def test_the_others_keep_what_they_remember() -> None:
     fit = three_unknown_starts()
-    found = at_rest(fit, [1])
+    found = begun_at_rest(fit, [1])
     assert [one.rested for one in found.records] == [False, True, False]
     assert found.layout.size == fit.layout.size - fit.layout.operator.unknowns
     for k in (0, 2):
@@ -33,7 +33,7 @@ def test_the_others_keep_what_they_remember() -> None:
 
 
 def test_a_record_counts_from_rest_on() -> None:
-    found = counted_from_rest(at_rest(three_unknown_starts(), [0, 2]))
+    found = counted_from_rest(begun_at_rest(three_unknown_starts(), [0, 2]))
     assert [one.first for one in found.records] == [0, 100, 0]
 
 
