@@ -225,8 +225,7 @@ class ScanNode(Node, ABC):
         if trouble is None and self.info is not None and self.state == READY:
             trouble = self._late(now)
         if trouble is None and self.info is not None and self.state == RUNNING:
-            limits = self.longest_standstill(), self._longest_pause()
-            trouble = self.peers.standstill(self._own_report(), self.info, now, *limits)
+            trouble = self.standstill(self.longest_standstill())
         if trouble:
             raise ScanError(trouble)
         self._watch_publishers(now)
@@ -234,6 +233,11 @@ class ScanNode(Node, ABC):
     def patience(self) -> float:
         """Return how long (s) another node may be silent while the scan runs."""
         return float(self.settings["liveness_timeout_s"])
+
+    def standstill(self, timeout: float) -> str | None:
+        """Name the node at which the samples of a running scan have stood for ``timeout`` s."""
+        own, pause = self._own_report(), self._longest_pause()
+        return self.peers.standstill(own, self.scan, time.monotonic(), timeout, pause)
 
     def longest_standstill(self) -> float:
         """Return how long (s) samples may stand still: a block is output meanwhile."""

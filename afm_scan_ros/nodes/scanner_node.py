@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import refuse_step
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
@@ -17,7 +17,7 @@ from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import DriverTimeouts
 from afm_scan_ros.nodes.block_consumer import ManagedConsumer
 from afm_scan_ros.nodes.parameters import NodeParameter
-from afm_scan_ros.nodes.peers import DONE
+from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
 TIMEOUTS = (
@@ -72,7 +72,7 @@ class ScannerNode(ManagedConsumer):
         given = self.settings
         opening = given["driver_timeout_s"]
         upstream, liveness = given["upstream_timeout_s"], given["liveness_timeout_s"]
-        # The nodes know of whom the drive is missing, and speak first.
+        # The nodes usually speak first, since they know of whom the drive is missing.
         starved = upstream * max(1.0, given["time_scale"]) + self.safety.heartbeat
         own = {"rest": self.safety.rest, "sign_of_life": self.safety.sign_of_life}
         real, simulated = (
@@ -113,11 +113,10 @@ class ScannerNode(ManagedConsumer):
 
     def step(self) -> bool:
         """Keep the driver running while no error is found."""
-        if self._is_open:
-            self._driver.show_life()
-        if self.is_active:
-            self._publish_answer()
-            self._move_on()
+        try:
+            self._drive()
+        except ScanError as error:  # the driver may be the first to miss what another node owes
+            raise ScanError(f"{error}{self._missing()}") from error
         return super().step() or bool(self._moving)
 
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - reads one topic
@@ -150,8 +149,30 @@ class ScannerNode(ManagedConsumer):
         return self._driving
 
     def settle(self, reason: str) -> str:
-        """Ramp the drive down before anything is said."""
-        return self._driver.ramp_down(reason) if self._is_open else reason
+        """Ramp the drive down before anything is said, even where the driver has by itself."""
+        outcome = self._driver.ramp_down(reason) if self._is_open else reason
+        if reason.startswith(outcome):
+            return reason
+        return outcome if outcome.startswith(reason) else f"{outcome}; {reason}"
+
+    def _drive(self) -> None:
+        """Show the driver that the node lives, and exchange blocks with it."""
+        if self._is_open:
+            self._driver.show_life()
+        if self.is_active:
+            self._publish_answer()
+            self._move_on()
+
+    def _missing(self) -> str:
+        """Name another node that keeps samples waiting, where there is one.
+
+        Of all that was heard, also before this node paused: nothing is decided by it any more.
+        """
+        if self.state != RUNNING:
+            return ""
+        self.peers.listen_anew(0.0)
+        trouble = self.standstill(0.5 * self.longest_standstill())
+        return f"; {trouble}" if trouble and not trouble.startswith(self.get_name()) else ""
 
     def _move_on(self) -> None:
         """Give the driver, if it is idle, the blocks received meanwhile as one block."""

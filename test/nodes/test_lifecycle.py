@@ -1,10 +1,12 @@
 """The scanner's node is managed as any of ROS: by its services, and safe whatever it is told."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from attrs import evolve
 from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.node import Node
@@ -16,7 +18,7 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.messages import Message
-from afm_scan_ros.nodes.peers import FAILED
+from afm_scan_ros.nodes.peers import FAILED, RUNNING, Report
 from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -143,6 +145,33 @@ class Faulty(PiezoscannerSim):
         raise RuntimeError("a fault of the program")
 
 
+class Starving(PiezoscannerSim):
+    """Its driver is the first to miss the drive."""
+
+    def _drive(self) -> None:
+        self._advanced -= 10.0
+        raise ScanError("no drive for 0.35 s")
+
+
+@pytest.mark.parametrize("silent", [True, False])
+def test_the_name_of_a_silent_node_follows_where_the_driver_misses_the_drive_first(
+    operator: Operator, *, silent: bool
+) -> None:
+    node = Starving()
+    operator.beside.append(node)
+    node.begin(evolve(INFO, nodes=("source", NAME)))
+    now = time.monotonic()
+    node.state = RUNNING
+    node.peers.listen_anew(now)  # as after a pause, since which nothing is decided by silence
+    last = now - 10.0 if silent else now
+    node.peers.hear(Report("source", INFO.scan_id, RUNNING, 1000, "", last))
+    with pytest.raises(ScanError) as caught:
+        node.step()
+    named = "; source has been silent for 10 s" if silent else ""
+    assert str(caught.value) == f"no drive for 0.35 s{named}"
+    node.destroy_node()
+
+
 def test_an_error_in_a_transition_ends_the_node(operator: Operator) -> None:
     node = Faulty()
     operator.beside.append(node)
@@ -178,7 +207,7 @@ def test_a_transition_that_is_impossible_keeps_the_node_alive(
 def test_a_block_before_the_scanner_is_active_moves_nothing(operator: Operator) -> None:
     assert operator.said == {}
     node = PiezoscannerSim()
-    node.begin(INFO)
+    node.begin(evolve(INFO, nodes=("source", NAME)))
     block = Trace(0, INFO.sample_period, np.ones(10), np.ones(10))
     said = "drive_voltage: a block came while this node waits to be configured"
     with pytest.raises(ScanError, match=f"^{said}$"):
