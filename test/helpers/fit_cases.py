@@ -121,7 +121,7 @@ def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
 
 def signals(drive: Array, moved: Array, block: int) -> Signals:
     found = signals_of("a", drive, moved, PERIOD, depolarised=True, settings=SETTINGS)
-    return evolve(found, block=block)
+    return evolve(found, block=block, edges=block * np.arange(len(drive) // block + 1))
 
 
 def of_plays_alone(drive: Array, moved: Array) -> tuple[Layout, list[Signals], float, Array]:

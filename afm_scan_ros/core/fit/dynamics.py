@@ -10,6 +10,7 @@ displacement k depends on inputs up to k - 1:
 """
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
 
 Complex = NDArray[np.complex128]
@@ -130,11 +132,11 @@ def _product(
 
 @frozen(eq=False)
 class Response:
-    """Means over blocks of y, shape (blocks,), and of what its derivatives are made of.
+    """Means of y over blocks, shape (blocks,), and over stretches of what its derivatives hold.
 
-    ``modes`` x_i and ``changes`` ∂x_i/∂p_i, shape (blocks, modes), and ``lags`` x_i (blocks, lags)
-    are before the creep; ``late`` (blocks, time constants) is what each creep element makes of V's
-    output.
+    ``modes`` x_i and ``changes`` ∂x_i/∂p_i, shape (stretches, modes), and ``lags`` x_i (stretches,
+    lags) are before the creep; ``late`` (stretches, time constants) is what each creep element
+    makes of V's output.
     """
 
     output: Array
@@ -145,16 +147,19 @@ class Response:
 
 
 def respond(
-    dynamics: PoleBank, period: float, inputs: Array, block: int, settled: float
+    dynamics: PoleBank, period: float, inputs: Array, block: int, edges: Edges, settled: float
 ) -> Response:
-    """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
+    """Response to inputs (n,), of a scanner that has settled under the input ``settled``.
+
+    ``edges`` of the stretches are multiples of ``block``.
+    """
     dynamics = dynamics.read()
     z, count = np.exp(dynamics.poles * period), dynamics.modes
     slow = np.exp(-period / dynamics.time_constants)
     modes = z[:count], dynamics.weights[:count]
     lags = z[count:].real.copy(), dynamics.weights[count:].real.copy()
     creep = slow, dynamics.gains
-    return Response(*_respond(*modes, *lags, *creep, period, inputs, block, settled))
+    return Response(*_respond(*modes, *lags, *creep, period, inputs, block, edges, settled))
 
 
 @compiled
@@ -168,21 +173,22 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
     period: float,
     inputs: Array,
     block: int,
+    edges: Edges,
     settled: float,
 ) -> tuple[Array, Complex, Complex, Array, Array]:
-    blocks = inputs.size // block
+    blocks, stretches = inputs.size // block, edges.size - 1
     output, lags, late = (
         np.zeros(blocks),
-        np.zeros((blocks, fast.size)),
-        np.zeros((blocks, slow.size)),
+        np.zeros((stretches, fast.size)),
+        np.zeros((stretches, slow.size)),
     )
-    modes = np.zeros((blocks, z.size), np.complex128)
-    changes = np.zeros((blocks, z.size), np.complex128)
+    modes = np.zeros((stretches, z.size), np.complex128)
+    changes = np.zeros((stretches, z.size), np.complex128)
     x, d = np.full(z.size, settled + 0j), np.zeros(z.size, np.complex128)
     lag, c = np.full(fast.size, settled), np.full(slow.size, settled)
     c *= weights.real.sum() + shares.sum()
-    for b in range(blocks):
-        for k in range(b * block, (b + 1) * block):
+    for b in range(stretches):
+        for k in range(edges[b], edges[b + 1]):
             v, y = inputs[k], 0.0
             for i in range(z.size):
                 y += weights[i].real * x[i].real - weights[i].imag * x[i].imag
@@ -199,102 +205,108 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
                 total += gains[j] * c[j]
                 late[b, j] += c[j]
                 c[j] = y + slow[j] * (c[j] - y)
-            output[b] += total
-    share = 1.0 / block
-    output *= share
-    modes *= share
-    changes *= share
-    lags *= share
-    late *= share
+            output[k // block] += total
+        share = 1.0 / (edges[b + 1] - edges[b])
+        modes[b] *= share
+        changes[b] *= share
+        lags[b] *= share
+        late[b] *= share
+    output /= block
     return output, modes, changes, lags, late
 
 
-def pulled_inputs(
-    bank: tuple[Complex, Complex], period: float, pull: Array, block: int
-) -> tuple[Array, float]:
-    """Derivatives of Σ_b pull_b y_b by the inputs, summed over blocks, and by the settled input.
+class _HeldBank(NamedTuple):
+    """By the length of a stretch: z, weights of the states in means, and of the input."""
 
-    y_b is the mean over block b of what ``bank`` makes of the inputs; ``pull`` and the first result
-    have shape (blocks,).
-    """
-    poles, weights = bank
-    return _pulled_inputs(np.exp(poles * period), weights, pull / block, block)
-
-
-@compiled
-def _pulled_inputs(z: Complex, weights: Complex, pull: Array, block: int) -> tuple[Array, float]:
-    result, later = np.zeros(pull.size), np.zeros(z.size, np.complex128)
-    for b in range(pull.size - 1, -1, -1):
-        for _ in range(block):
-            total = 0.0
-            for i in range(z.size):
-                total += ((1.0 - z[i]) * later[i]).real
-                later[i] = z[i] * later[i] + weights[i] * pull[b]
-            result[b] += total
-    return result, later.real.sum()
+    z: Complex
+    takes: Complex
+    modes: int
+    through: Array
 
 
 class HeldFilter:
-    """A bank of poles for columns held over blocks, piece by piece; gives means over blocks.
+    """A bank of poles for columns held over stretches, piece by piece; gives means over these.
 
-    Before the first block of ``length`` (s) each column had settled at its value in ``settled``.
+    Before the first stretch each column had settled at its value in ``settled``.
     """
 
     def __init__(
         self,
         bank: tuple[Complex, Complex],
         direct: float,
-        length: float,
-        block: int,
+        period: float,
+        edges: Edges,
         settled: Array,
     ) -> None:
         some = np.flatnonzero(bank[1])
         order = some[np.argsort(bank[0][some].imag == 0.0, kind="stable")]
         poles, weights = (each[order] for each in bank)
-        self._modes = int(np.count_nonzero(poles.imag))
-        self._z = np.exp(poles * length)
-        mean = np.expm1(poles * length) / (block * np.expm1(poles * length / block))
-        self._takes = mean * weights
-        self._through = direct + float(np.sum((1.0 - mean) * weights).real)
+        lengths, self._which = np.unique(np.diff(edges), return_inverse=True)
+        samples = lengths[:, np.newaxis]
+        mean = np.expm1(poles * period * samples) / (samples * np.expm1(poles * period))
+        self._bank = _HeldBank(
+            np.exp(poles * period * samples),
+            mean * weights,
+            int(np.count_nonzero(poles.imag)),
+            direct + np.sum((1.0 - mean) * weights, axis=1).real,
+        )
+        self._first = 0
         self._states = np.zeros((2, len(poles), len(settled)))
         self._states[0] = settled
         self._live = settled != 0.0
 
     def __call__(self, columns: Array) -> Array:
-        """Means of the output for the next piece, both (blocks, columns).
+        """Means of the output for the next piece, both (stretches, columns).
 
         A column that has been zero so far costs nothing.
         """
+        which = self._which[self._first : self._first + len(columns)]
+        self._first += len(columns)
         if not self._live.all():
             self._live |= columns.any(axis=0)
         if self._live.all():
-            return self._passed(columns, *self._states)
+            return _filtered(columns, which, self._bank, *self._states)
         result, states = np.zeros(columns.shape), np.compress(self._live, self._states, axis=2)
-        result[:, self._live] = self._passed(np.compress(self._live, columns, axis=1), *states)
+        some = np.compress(self._live, columns, axis=1)
+        result[:, self._live] = _filtered(some, which, self._bank, *states)
         self._states[:, :, self._live] = states
         return result
 
-    def _passed(self, columns: Array, real: Array, imag: Array) -> Array:
-        return _filtered(columns, self._z, self._takes, self._modes, self._through, real, imag)
+    def pulled(self, pull: Array) -> tuple[Array, float]:
+        """Derivatives of Σ_s pull_s y_s by the inputs of all stretches, and by the settled input.
+
+        y_s is the mean of the output over stretch s; ``pull`` and the first result have the shape
+        (stretches,).
+        """
+        return _pulled(pull, self._which, self._bank)
 
 
 @compiled
-def _filtered(
-    columns: Array,
-    z: Complex,
-    takes: Complex,
-    modes: int,
-    through: float,
-    real: Array,
-    imag: Array,
-) -> Array:
+def _pulled(pull: Array, which: Edges, bank: _HeldBank) -> tuple[Array, float]:
+    z, takes, _, through = bank
+    result, later = np.zeros(pull.size), np.zeros(z.shape[1], np.complex128)
+    for s in range(pull.size - 1, -1, -1):
+        kind = which[s]
+        total = through[kind] * pull[s]
+        for i in range(z.shape[1]):
+            total += ((1.0 - z[kind, i]) * later[i]).real
+            later[i] = z[kind, i] * later[i] + takes[kind, i] * pull[s]
+        result[s] = total
+    return result, later.real.sum()
+
+
+@compiled
+def _filtered(columns: Array, which: Edges, bank: _HeldBank, real: Array, imag: Array) -> Array:
+    z, takes, modes, through = bank
     blocks, many = columns.shape
     result = np.empty((blocks, many))
     for b in range(blocks):
+        kind = which[b]
         for c in range(many):
-            result[b, c] = through * columns[b, c]
+            result[b, c] = through[kind] * columns[b, c]
         for i in range(modes):
-            tr, ti, zr, zi = takes[i].real, takes[i].imag, z[i].real, z[i].imag
+            tr, ti = takes[kind, i].real, takes[kind, i].imag
+            zr, zi = z[kind, i].real, z[kind, i].imag
             for c in range(many):
                 v = columns[b, c]
                 xr, xi = real[i, c], imag[i, c]
@@ -302,8 +314,8 @@ def _filtered(
                 xr -= v
                 real[i, c] = v + zr * xr - zi * xi
                 imag[i, c] = zr * xi + zi * xr
-        for i in range(modes, z.size):
-            tr, zr = takes[i].real, z[i].real
+        for i in range(modes, z.shape[1]):
+            tr, zr = takes[kind, i].real, z[kind, i].real
             for c in range(many):
                 v, xr = columns[b, c], real[i, c]
                 result[b, c] += tr * xr

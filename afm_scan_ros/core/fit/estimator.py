@@ -76,7 +76,7 @@ class AxisFit:
     damping: float = field()
     damping_alone: float = 1.0
     _columns: dict[int, tuple[Array | None, list[Columns]]] = field(factory=dict)
-    _regressors: dict[int, tuple[object, Array, Array]] = field(factory=dict)
+    _regressors: dict[int, tuple[object, dict[bool, tuple[Array, Array]]]] = field(factory=dict)
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
     @scales.default
@@ -120,27 +120,39 @@ class AxisFit:
             self._last = self.layout, theta, every
         return self._last[2]
 
-    def _without(self, simulations: Sequence[Simulation]) -> Iterator[tuple[Array, Array]]:
+    def _without(
+        self, simulations: Sequence[Simulation], *, gathered: bool = False
+    ) -> Iterator[tuple[Array, Array]]:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
         for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
             left = record.mean - self.gain * simulation.response.output[record.used]
-            yield left, self.free_of(k).without(left)
+            left = record.gathered(left) if gathered else left
+            yield left, self.free_of(k, gathered=gathered).without(left)
 
     def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
         return [residual for _, residual in self._without(simulations)]
 
-    def misfit(self, theta: Array) -> float:
+    def gathered(self) -> list[Array]:
+        """Residuals (m) of the stretches that count, as ``Signals.gathered``, at θ."""
+        pairs = self._without(self.simulated(self.theta), gathered=True)
+        return [residual for _, residual in pairs]
+
+    def misfit(self, theta: Array, *, gathered: bool = True) -> float:
         """Half the weighted sum of squared residuals, and of squared weights of what is free.
 
         These are fitted, so that both together are half of what the model leaves times what remains
-        of that.
+        of that. Residuals are those ``gathered`` over stretches, or else of blocks.
         """
-        pairs = zip(self.records, self._without(self.simulated(theta)), strict=True)
+        lefts = self._without(self.simulated(theta), gathered=gathered)
+        pairs = zip(self.records, lefts, strict=True)
         return sum(0.5 * float(a @ b) / self.variance(record) for record, (a, b) in pairs)
 
     def objective(self, theta: Array) -> float:
-        """Minus the logarithm of the posterior, but for a constant; infinite where it overflows."""
+        """Minus the logarithm of the posterior, but for a constant; infinite where it overflows.
+
+        The residual within stretches counts as constant, since derivatives do not see it.
+        """
         precision, mean = self.layout.prior(self.scales, self.theta)
         apart = theta - mean
         try:
@@ -157,7 +169,8 @@ class AxisFit:
         matrix, _ = self.normal(with_operator=True)
         volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(matrix + precision)[1]
         of_noise = sum(len(one.mean) * np.log(self.variance(one)) for one in self.records)
-        return float(0.5 * (volume - of_noise) - self.objective(self.theta))
+        within = self.misfit(self.theta, gathered=False) - self.misfit(self.theta)
+        return float(0.5 * (volume - of_noise) - self.objective(self.theta) - within)
 
     def normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,).
@@ -170,7 +183,7 @@ class AxisFit:
 
     def _normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
-        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
+        for k, left in enumerate(self.gathered()):
             pieces = self.columns(k, with_operator=with_operator)
             of_record = self.products(k, left, pieces)
             matrix += of_record[0]
@@ -180,11 +193,11 @@ class AxisFit:
     def products(
         self, k: int, left: Array, pieces: Iterable[tuple[slice, Array]]
     ) -> tuple[Array, Array]:
-        """H and g of a record of which so much is ``left`` (m), (blocks that count,).
+        """H and g of a record of which so much is ``left`` (m), (stretches that count,).
 
         The derivatives of ``columns`` come in pieces. What is free in the record is eliminated.
         """
-        variance, free = self.variance(self.records[k]), self.free_of(k)
+        variance, free = self.variance(self.records[k]), self.free_of(k, gathered=True)
         products, right, share = np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0))
         for rows, one in pieces:
             if not len(right):
@@ -218,7 +231,7 @@ class AxisFit:
                 up, down, middle = (one.response.output[record.used] for one in three)
                 variance = self.variance(record)
                 added = self.gain * (2.0 * middle - up - down) / part**2
-                left = self.free_of(k).without(added)
+                left = self.free_of(k, gathered=True).without(record.gathered(added))
                 pieces = self._pieces_of(k) if with_operator else None
                 pull = self.gain * left / variance
                 right += pulled(self.layout, self.theta, record, here[k], pieces, pull)
@@ -310,14 +323,18 @@ class AxisFit:
         for name in (*layout.operator.parts, "map", "sensor", "memory"):
             self.theta[layout.parts[name]] = theta[before[name]]
 
-    def free_of(self, k: int) -> Free:
-        """What is free in a record; its regressors are kept while they stay the same."""
+    def free_of(self, k: int, *, gathered: bool = False) -> Free:
+        """What is free in a record, by blocks or ``gathered`` over stretches.
+
+        The regressors are kept while they stay the same.
+        """
         record, slow = self.records[k], self.layout.time_constants
         key = record.tones, tuple(slow)
         if k not in self._regressors or self._regressors[k][0] != key:
             columns = record.regressors(slow, self.layout.settings.creep)
-            self._regressors[k] = key, columns, columns.T @ columns
-        return Free(*self._regressors[k][1:], self.variance(record))
+            both = {False: columns, True: record.gathered(columns)}
+            self._regressors[k] = key, {way: (one, one.T @ one) for way, one in both.items()}
+        return Free(*self._regressors[k][1][gathered], self.variance(record))
 
     def _pieces_of(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept.
@@ -332,7 +349,7 @@ class AxisFit:
             near = 0.5 * self.layout.settings.play_step * operator.half
             if memory is None or kept is None or np.abs(memory - kept).max() < near:
                 return pieces
-        made = operator.pieces(theta, record.drive, record.block, memory)
+        made = operator.pieces(theta, record.drive, record.edges, memory)
         if not operator.linear:
             return made
         self._columns[k] = memory, list(made)

@@ -81,7 +81,7 @@ def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurfac
     drive = np.interp(np.arange(places[-1] + 1), places, corners)
     model, plays = Duhem(slopes), Plays(slopes.lower, slopes.upper, settings)
     output = model.apply(model.at_rest(), drive)[1]
-    pieces = plays.pieces(plays.unbent(), drive, 1, None)
+    pieces = plays.pieces(plays.unbent(), drive, np.arange(len(drive) + 1), None)
     columns = np.concatenate([one[:, : len(plays.thresholds)] for one in pieces]).astype(float)
     density, _ = nnls(columns - columns.mean(axis=0), output - output.mean())
     theta = np.zeros_like(plays.unbent())

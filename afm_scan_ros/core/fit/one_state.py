@@ -20,7 +20,7 @@ from afm_scan_ros.core.effects.hysteresis.branches import (
 )
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import averaged
+from afm_scan_ros.core.fit.stretches import Edges, means
 from afm_scan_ros.core.types import Array
 
 
@@ -90,22 +90,22 @@ class OneState:
         line = np.ones(count + 3), np.linspace(self.lower, self.upper, count + 1)
         return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
 
-    def remembered(self, theta: Array, drive: Array, block: int, memory: Array) -> Array:
-        """∂A/∂memory averaged over blocks, shape (blocks, 1), by a difference."""
+    def remembered(self, theta: Array, drive: Array, edges: Edges, memory: Array) -> Array:
+        """∂A/∂memory averaged over stretches, shape (stretches, 1), by a difference."""
         apart = np.sqrt(np.finfo(float).eps) * self.half
         ends = (self.output(theta, drive, memory + way * apart) for way in (1.0, -1.0))
-        up, down = (averaged(one, block) for one in ends)
+        up, down = (means(one, edges) for one in ends)
         return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))
 
     def pieces(
-        self, theta: Array, drive: Array, block: int, memory: Array | None
+        self, theta: Array, drive: Array, edges: Edges, memory: Array | None
     ) -> Iterator[Array]:
-        """Yield ∂A/∂theta averaged over blocks, in pieces of shape (blocks, parameters)."""
+        """Yield ∂A/∂theta averaged over stretches, in pieces of shape (stretches, parameters)."""
         now, grown = _now(drive, memory), self.unbent()
-        tables, size = theta.reshape(self.shape), block * self.settings.blocks_at_once
-        for first in range(0, len(drive) // block * block, size):
-            part = drive[first : first + size]
-            yield mean_sensitivities(tables, self.cells, now, grown, part, block)
+        tables, at_once = theta.reshape(self.shape), self.settings.rows_at_once
+        for first in range(0, len(edges) - 1, at_once):
+            part = edges[first : first + at_once + 1]
+            yield mean_sensitivities(tables, self.cells, now, grown, drive, part)
 
     def started(self, paths: Sequence[tuple[Array, Array]]) -> list[Array]:
         """Slopes that lead from each sample of drive and A (V) to the next, ever smoother ones.
@@ -130,7 +130,7 @@ class OneState:
     def _stepped(self, paths: Sequence[tuple[Array, Array]], theta: Array) -> tuple[Array, Array]:
         """Normal equations for the slopes that lead from sample to sample, linearised at some."""
         matrix, right = np.zeros((self.parts["slopes"],) * 2), self.unbent()
-        at_once = self.settings.blocks_at_once
+        at_once = self.settings.rows_at_once
         for drive, output in paths:
             w = output - drive
             for first in range(0, len(drive) - 1, at_once):

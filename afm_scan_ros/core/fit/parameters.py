@@ -28,7 +28,7 @@ from afm_scan_ros.core.types import Array
 
 Operator: TypeAlias = Plays | OneState
 Columns: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
-"""∂A/∂(operator) averaged over blocks, shape (blocks, parameters)."""
+"""∂A/∂(operator) averaged over stretches, shape (stretches, parameters)."""
 
 Mode: TypeAlias = tuple[float, float, float, float]
 """Angular frequency (rad/s), damping, and both parts of the weight κ."""

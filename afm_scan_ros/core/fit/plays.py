@@ -24,6 +24,7 @@ from scipy.linalg import block_diag
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
 
 
@@ -182,9 +183,9 @@ class Plays:
         apart = np.clip(self._hats @ memory, -self.thresholds, self.thresholds)
         return np.where(self.thresholds > self.half, self.settled, float(drive[0]) + apart)
 
-    def remembered(self, theta: Array, drive: Array, block: int, memory: Array) -> Array:
-        """∂P/∂memory averaged over blocks, shape (blocks, unknowns): of plays that never moved."""
-        start, tables, blocks = self.start(drive, memory), self.tables(theta), len(drive) // block
+    def remembered(self, theta: Array, drive: Array, edges: Edges, memory: Array) -> Array:
+        """∂P/∂memory averaged over stretches, (stretches, unknowns): of plays that never moved."""
+        start, tables, count = self.start(drive, memory), self.tables(theta), len(edges) - 1
         slopes = [
             np.interp(at, self.positions, each)
             for at, each in zip(start, np.gradient(tables, self.positions, axis=1), strict=True)
@@ -196,11 +197,12 @@ class Plays:
             np.searchsorted(highest, start + self.thresholds, "right"),
             np.searchsorted(lowest, self.thresholds - start, "right"),
         )
-        lost, (block_of, within) = np.zeros((blocks + 1, self.unknowns)), np.divmod(moved, block)
-        late = (within / block)[:, np.newaxis] * each
-        np.add.at(lost, np.minimum(block_of, blocks), each - late)
-        np.add.at(lost, np.minimum(block_of + 1, blocks), late)
-        return np.asarray(each.sum(axis=0) - np.cumsum(lost, axis=0)[:blocks])
+        lost, place = np.zeros((count + 1, self.unknowns)), np.searchsorted(edges, moved, "right")
+        at, ends = np.minimum(place - 1, count), np.append(edges, edges[-1] + 1)
+        late = ((moved - ends[at]) / np.diff(ends)[at])[:, np.newaxis] * each
+        np.add.at(lost, at, each - late)
+        np.add.at(lost, np.minimum(at + 1, count), late)
+        return np.asarray(each.sum(axis=0) - np.cumsum(lost, axis=0)[:count])
 
     def weights(self, theta: Array) -> tuple[Array, Array]:
         """Density d_r, shape (plays,), and the correction's Σ_j c_j(r) b_j as (plays, splines)."""
@@ -221,14 +223,14 @@ class Plays:
         return _output(drive, self.thresholds, start, tables, self.lower, scale)
 
     def pieces(
-        self, _: Array, drive: Array, block: int, memory: Array | None
+        self, _: Array, drive: Array, edges: Edges, memory: Array | None
     ) -> Iterator[NDArray[np.float32]]:
-        """Yield ∂P/∂theta averaged over blocks, in pieces of shape (blocks, parameters).
+        """Yield ∂P/∂theta averaged over stretches, in pieces of shape (stretches, parameters).
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
-        mean = _means(drive, self.thresholds, self.start(drive, memory), block)
-        at_once = self.settings.blocks_at_once
+        mean = _means(drive, self.thresholds, self.start(drive, memory), edges)
+        at_once = self.settings.rows_at_once
         for first in range(0, len(mean), at_once):
             yield self._columns(mean[first : first + at_once])
 
@@ -303,17 +305,16 @@ def _output(
 
 
 @compiled
-def _means(drive: Array, thresholds: Array, plays: Array, block: int) -> Array:
-    blocks = drive.size // block
-    result = np.zeros((blocks, plays.size))
-    for k in range(blocks):
-        for j in range(block):
-            u = drive[k * block + j]
+def _means(drive: Array, thresholds: Array, plays: Array, edges: Edges) -> Array:
+    result = np.zeros((edges.size - 1, plays.size))
+    for k in range(edges.size - 1):
+        for j in range(edges[k], edges[k + 1]):
+            u = drive[j]
             for i in range(plays.size):
                 plays[i] = min(u + thresholds[i], max(u - thresholds[i], plays[i]))
                 result[k, i] += plays[i]
         for i in range(plays.size):
-            result[k, i] /= block
+            result[k, i] /= edges[k + 1] - edges[k]
     return result
 
 

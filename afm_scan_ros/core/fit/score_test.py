@@ -42,7 +42,7 @@ class ScoreTest:
     def __init__(self, fit: AxisFit, free: NDArray[np.bool_]) -> None:
         self.fit, self.free = fit, np.flatnonzero(free)
         self.with_operator = bool(free[: fit.layout.parts["map"].stop].any())
-        self._left = fit.residuals(fit.simulated(fit.theta))
+        self._left = fit.gathered()
         self._columns = [
             [
                 (rows, one[:, self.free].astype(np.float32))
@@ -67,8 +67,8 @@ class ScoreTest:
 
     def of(self, places: Sequence[Place]) -> Iterator[FoundMode]:
         """Yield what each mode explains; so many are tried at a time as memory holds."""
-        blocks = max(one.blocks for one in self.fit.records)
-        at_once = max(self.fit.layout.settings.mode_values // blocks, 1)
+        rows = max(len(one.weights) for one in self.fit.records)
+        at_once = max(self.fit.layout.settings.mode_values // rows, 1)
         for first in range(0, len(places), at_once):
             yield from self._of(places[first : first + at_once])
 
@@ -109,8 +109,9 @@ class ScoreTest:
         pull, simulations = np.zeros(len(at)), wider.simulated(wider.theta)
         for k, (record, simulation) in enumerate(zip(fit.records, simulations, strict=True)):
             given = wider.layout, wider.theta, record, simulation
-            columns = fit.gain * of_vibration(*given)[record.used][:, at]
-            free, variance = fit.free_of(k), fit.variance(record)
+            columns = of_vibration(*given)[record.stretches][:, at]
+            columns *= fit.gain * record.weights[:, np.newaxis]
+            free, variance = fit.free_of(k, gathered=True), fit.variance(record)
             alone = free.without(columns) / variance
             own += columns.T @ alone
             pull += columns.T @ self._left[k] / variance

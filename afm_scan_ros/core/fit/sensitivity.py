@@ -1,4 +1,4 @@
-"""The model of a record: its displacement sample by sample, and ∂displacement/∂θ block by block."""
+"""The model of a record: its displacement by samples, and ∂displacement/∂θ by stretches."""
 
 from collections.abc import Iterable, Iterator
 
@@ -6,9 +6,10 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
-from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, pulled_inputs, respond
+from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, respond
 from afm_scan_ros.core.fit.parameters import Columns, Layout
-from afm_scan_ros.core.fit.signals import Signals, averaged
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.stretches import means
 from afm_scan_ros.core.types import Array
 
 
@@ -31,7 +32,7 @@ def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
     if mapped is not None:
         raw, rest = mapped.output(raw), mapped.output(rest)
     settled, dynamics = float(rest[0]), layout.dynamics(theta)
-    response = respond(dynamics, record.period, raw, record.block, settled)
+    response = respond(dynamics, record.period, raw, record.block, record.edges, settled)
     return Simulation(raw, settled, dynamics, response)
 
 
@@ -42,12 +43,13 @@ def jacobian(
     simulation: Simulation,
     pieces: Iterable[Columns] | None,
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield ∂y/∂θ for a gain of 1 in pieces, shape (blocks, size), averaged over blocks.
+    """Yield ∂y/∂θ for a gain of 1 in pieces, shape (stretches, size), averaged over stretches.
 
-    Each comes with the place of its blocks among all that count. ``pieces`` are those of
-    ∂A/∂(operator), averaged over all blocks; without them the operator is held.
+    Each row is multiplied by the weight of its stretch, and comes with its place among all that
+    count. ``pieces`` are those of ∂A/∂(operator), averaged over all stretches; without them the
+    operator is held.
     """
-    parts, used = layout.parts, record.used
+    parts, used = layout.parts, record.stretches
     vibration = slice(parts["lags"].start, parts["modes"].stop)
     moved, late = of_vibration(layout, theta, record, simulation), simulation.response.late
     corner = _of_sensor(layout, theta, record, simulation)
@@ -63,7 +65,9 @@ def jacobian(
             result[:, vibration] = moved[rows]
             result[:, parts["creep"]] = late[rows]
             result[:, parts["sensor"]] = corner[rows]
-            yield slice(rows.start - used.start, last - used.start), result
+            place = slice(rows.start - used.start, last - used.start)
+            result *= record.weights[place, np.newaxis]
+            yield place, result
         first = last
 
 
@@ -75,12 +79,12 @@ def pulled(
     pieces: Iterable[Columns] | None,
     pull: Array,
 ) -> Array:
-    """Return Jᵀ pull, shape (size,), with the blocks' J of ``jacobian``, without making it.
+    """Return Jᵀ pull, shape (size,), with the J of ``jacobian``, without making it.
 
-    What V and C do to the columns of J is done backwards to ``pull``, shape (blocks that count,).
+    What V and C do to the columns of J is done backwards to ``pull``, (stretches that count,).
     """
-    parts, whole = layout.parts, np.zeros(record.blocks)
-    whole[record.used] = pull
+    parts, whole = layout.parts, np.zeros(len(record.edges) - 1)
+    whole[record.stretches] = pull * record.weights
     result = np.zeros(layout.size)
     vibration = slice(parts["lags"].start, parts["modes"].stop)
     result[vibration] = whole @ of_vibration(layout, theta, record, simulation)
@@ -89,12 +93,13 @@ def pulled(
     if pieces is not None:
         operator, mapped = layout.operator, layout.map_of(theta)
         bank, first = simulation.dynamics.parallel(), 0
-        inputs, settled = pulled_inputs(bank, record.period, whole, record.block)
+        through = HeldFilter(bank, 0.0, record.period, record.edges, np.zeros(1))
+        inputs, settled = through.pulled(whole)
         if record.rested:
             result[: parts["map"].stop] += settled * _by_rest(layout, theta)
         else:
             inputs[0] += settled
-        effective = averaged(simulation.effective, record.block)
+        effective = means(simulation.effective, record.edges)
         if mapped is not None:
             inputs /= mapped.slope(effective)
         bends = terms(effective, operator.lower, operator.upper, operator.bends)
@@ -120,12 +125,12 @@ def _of_operator(
     those by the record's memory, which are alone where the operator is held.
     """
     operator, mapped = layout.operator, layout.map_of(theta)
-    effective = averaged(simulation.effective, record.block)
+    effective = means(simulation.effective, record.edges)
     bends = terms(effective, operator.lower, operator.upper, operator.bends)
     slopes = np.ones_like(effective) if mapped is None else mapped.slope(effective)
     held = pieces is None
     if pieces is None:
-        pieces, bends = [np.zeros((record.blocks, 0))], bends[:, :0]
+        pieces, bends = [np.zeros((len(effective), 0))], bends[:, :0]
     remembered = _remembered(layout, theta, record)
     bank, first, through = simulation.dynamics.parallel(), 0, None
     for columns in pieces:
@@ -135,16 +140,16 @@ def _of_operator(
         if through is None:
             rest = np.zeros(0) if held else _by_rest(layout, theta)
             settled = rest if record.rested else inputs[0]
-            through = HeldFilter(bank, 0.0, record.length, record.block, settled)
+            through = HeldFilter(bank, 0.0, record.period, record.edges, settled)
         yield through(inputs)
 
 
 def _remembered(layout: Layout, theta: Array, record: Signals) -> Array:
-    """∂A/∂memory averaged over blocks, (blocks, unknowns); no column where the start is known."""
+    """∂A/∂memory averaged over stretches, (stretches, unknowns); none where the start is known."""
     memory = layout.memory_of(theta, record)
     if record.unknown is None or memory is None:
-        return np.zeros((record.blocks, 0))
-    given = layout.of_operator(theta), record.drive, record.block, memory
+        return np.zeros((len(record.edges) - 1, 0))
+    given = layout.of_operator(theta), record.drive, record.edges, memory
     return layout.operator.remembered(*given)
 
 
@@ -161,14 +166,14 @@ def _by_rest(layout: Layout, theta: Array) -> Array:
     """Derivatives of F at depolarised rest by the operator and its map."""
     operator, given, rest = layout.operator, layout.of_operator(theta), np.zeros(1)
     mapped, at = layout.map_of(theta), at_rest(layout, theta)
-    (columns,) = operator.pieces(given, rest, 1, None)
+    (columns,) = operator.pieces(given, rest, np.arange(2), None)
     bends = terms(at, operator.lower, operator.upper, operator.bends)
     slope = 1.0 if mapped is None else mapped.slope(at)[0]
     return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
 
 
 def of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
-    """Derivatives by the weights of the lags, and by what θ holds of each mode."""
+    """Derivatives of all stretches by the weights of the lags, and by what θ holds of each mode."""
     dynamics = simulation.dynamics
     modes, changes, lags = dynamics.seen(simulation.response)
     columns, settled = [lags], [np.full(lags.shape[1], simulation.settled)]
@@ -181,21 +186,22 @@ def of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simu
         settled.append(np.array([0.0, 0.0, simulation.settled, 0.0]))
     slow = (-1.0 / layout.time_constants).astype(np.complex128)
     bank = slow, dynamics.gains.astype(np.complex128)
-    creep = HeldFilter(bank, 1.0, record.length, record.block, np.concatenate(settled))
+    creep = HeldFilter(bank, 1.0, record.period, record.edges, np.concatenate(settled))
     return creep(np.hstack(columns))
 
 
 def _of_sensor(layout: Layout, theta: Array, record: Signals, simulation: Simulation) -> Array:
-    """Derivative by the logarithm of the sensor's corner, (blocks, 1), by a difference.
+    """Derivative by the logarithm of the sensor's corner, (stretches, 1), by a difference.
 
     There is no column without a sensor.
     """
     part, apart = layout.parts["sensor"], float(np.cbrt(np.finfo(float).eps))
     step = np.zeros(layout.size)
     step[part] = apart
-    given = record.period, simulation.effective, record.block, simulation.settled
+    block, edges = record.block, record.edges
+    given = record.period, simulation.effective, block, edges, simulation.settled
     ends = [layout.dynamics(theta + way * step) for way in (1.0, -1.0) if layout.sensor_order]
     if not ends:
-        return np.zeros((record.blocks, 0))
-    up, down = (respond(one, *given).output for one in ends)
+        return np.zeros((len(edges) - 1, 0))
+    up, down = (means(respond(one, *given).output, edges // block) for one in ends)
     return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))

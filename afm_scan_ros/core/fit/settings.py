@@ -339,10 +339,10 @@ class FitSettings:
         "longest geodesic acceleration that bends a step",
         "M. K. Transtrum and J. P. Sethna, arXiv:1201.5885",
     )
-    blocks_at_once: int = setting(
+    rows_at_once: int = setting(
         1024,
         "1",
-        "blocks of which derivatives are made at a time",
+        "rows of derivatives that are made at a time",
         "a processor's cache holds them",
     )
     converged: float = setting(
@@ -410,6 +410,30 @@ class FitSettings:
         "1",
         "what averaging over blocks may remove, over the noise's variance",
         "a tenth of the information",
+    )
+    smooth_window: int = setting(
+        64,
+        "1",
+        "stretches of derivatives whose smoothness is tested together",
+        "their mean square is known to a sixth",
+    )
+    smooth_age: int = setting(
+        20,
+        "1",
+        "stretches for which both signals are to be smooth before a window",
+        "what decays since a step may change in a stretch by a twentieth",
+    )
+    smooth_sigma: float = setting(
+        3.0,
+        "standard deviations",
+        "excess of what a stretch hides of the displacement, over that of noise",
+        "by chance once in a thousand windows",
+    )
+    smooth_drive: float = setting(
+        0.05,
+        "1",
+        "what a stretch hides of the drive, over the drive's rms about it",
+        "derivatives so exact leave a twentieth of each step's misfit",
     )
     near_end: float = setting(
         0.01,

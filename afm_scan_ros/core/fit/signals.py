@@ -1,4 +1,4 @@
-"""One axis of a record as the fit takes it: blocks of samples, with their noise."""
+"""One axis of a record as the fit takes it: blocks of samples, with their noise, in stretches."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -9,6 +9,7 @@ from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
 from afm_scan_ros.core.types import Array
 
 
@@ -18,7 +19,8 @@ class Signals:
 
     ``rested`` is whether the scanner had long rested at 0 V, depolarised; otherwise ``unknown``
     says which of the unknown starts of a fit the record has, where it has one. ``noise`` (m) is the
-    standard deviation of a sample, ``tones`` (Hz) are sines in the displacement.
+    standard deviation of a sample, ``tones`` (Hz) are sines in the displacement. Stretches of
+    blocks, of one row of derivatives each, have ``edges`` in samples.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Signals:
     first: int
     rested: bool
     noise: float
+    edges: Edges
     tones: tuple[float, ...] = ()
     unknown: int | None = None
 
@@ -41,6 +44,25 @@ class Signals:
     def used(self) -> slice:
         """The blocks that count."""
         return slice(-(-self.first // self.block), self.blocks)
+
+    @cached_property
+    def stretches(self) -> slice:
+        """The stretches that count."""
+        start = int(np.searchsorted(self.edges, self.used.start * self.block))
+        return slice(start, len(self.edges) - 1)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Roots of the number of blocks in each stretch that counts."""
+        return np.asarray(np.sqrt(np.diff(self.edges[self.stretches.start :]) / self.block))
+
+    def gathered(self, signal: Array) -> Array:
+        """Sums over stretches of a signal over the blocks that count, divided by ``weights``.
+
+        Their products with derivatives times ``weights`` are those with the derivatives of blocks.
+        """
+        edges = self.edges[self.stretches.start :] // self.block - self.used.start
+        return np.asarray((np.add.reduceat(signal, edges[:-1]).T / self.weights).T)
 
     @cached_property
     def mean(self) -> Array:
@@ -112,7 +134,9 @@ def signals_of(
         )
     first = known_from(drive, settings, depolarised=depolarised)
     first = first if first < settings.most_left_out * len(drive) else 0
-    return Signals(name, drive, displacement, period, block, first, depolarised, noise)
+    both = averaged(drive, block), averaged(displacement, block)
+    edges = block * smooth_edges(*both, noise / np.sqrt(block), -(-first // block), settings)
+    return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
 
 
 def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:
@@ -138,12 +162,6 @@ def in_step(drive: Array, displacement: Array, settings: FitSettings) -> Array:
     if not reads_after(drive, displacement, settings):
         return drive
     return np.append(drive[1:], drive[-1])
-
-
-def averaged(signal: Array, block: int) -> Array:
-    """Means over blocks, shape (blocks, …)."""
-    count = len(signal) // block
-    return np.asarray(signal[: count * block].reshape(count, block, *signal.shape[1:]).mean(axis=1))
 
 
 def noise_of(signal: Array) -> float:

@@ -79,10 +79,13 @@ class Knowledge:
         drive = np.interp(np.arange(2001) % 1000, [0, 500, 1000], [low, high, low])
         period = min(one.period for one in fit.records)
         still = np.zeros_like(drive)
-        record = Signals("scan", drive, still, period, 1, 1000, rested=False, noise=0.0)
+        edges = np.arange(len(drive) + 1)
+        record = Signals(
+            "scan", drive, still, period, 1, 1000, rested=False, noise=0.0, edges=edges
+        )
         simulation = simulate(layout, fit.theta, record)
         theta = layout.of_operator(fit.theta)
-        pieces = layout.operator.pieces(theta, drive, 1, layout.memory_of(fit.theta, record))
+        pieces = layout.operator.pieces(theta, drive, edges, layout.memory_of(fit.theta, record))
         rows = [one for _, one in jacobian(layout, fit.theta, record, simulation, pieces)]
         change = np.concatenate(rows)
         change -= change.mean(axis=0)
@@ -145,7 +148,8 @@ def _opening(fit: AxisFit) -> tuple[float, Array]:
     drive = np.concatenate([up, up[-2::-1]])
     theta, used = fit.layout.of_operator(fit.theta), np.zeros(operator.unknowns)
     output = operator.output(theta, drive, used)
-    rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, 1, used))])
+    edges = np.arange(len(drive) + 1)
+    rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, edges, used))])
     row = np.zeros(fit.layout.size)
     row[: rows.shape[1]] = rows[3 * count] - rows[count]
     return float(output[3 * count] - output[count]), row

@@ -35,7 +35,8 @@ def information(fit: AxisFit) -> Array:
     lefts = fit.residuals(fit.simulated(fit.theta))
     matrix = np.zeros((fit.layout.size,) * 2)
     for k, left in enumerate(lefts):
-        of_record, _ = fit.products(k, left, fit.columns(k, with_operator=True))
+        given = fit.records[k].gathered(left), fit.columns(k, with_operator=True)
+        of_record, _ = fit.products(k, *given)
         matrix += of_record / samples_alike(left, fit.layout.settings.residual_segments)
     return matrix
 
@@ -77,11 +78,12 @@ def predicted(fit: AxisFit, drive: Array, period: float) -> PredictedMotion:
             f"the drive reaches {drive.min():.4g} to {drive.max():.4g} V, but the records only"
             f" {operator.lower:.4g} to {operator.upper:.4g} V"
         )
-    record = Signals("prediction", drive, np.zeros(count), period, 1, 0, rested=True, noise=0.0)
+    given, edges = ("prediction", drive, np.zeros(count), period, 1, 0), np.arange(count + 1)
+    record = Signals(*given, rested=True, noise=0.0, edges=edges)
     simulation = simulate(fit.layout, fit.theta, record)
     moved = fit.gain * (simulation.response.output - simulation.response.output[0])
     theta = fit.layout.of_operator(fit.theta)
-    pieces = operator.pieces(theta, drive, 1, None)
+    pieces = operator.pieces(theta, drive, edges, None)
     variance, rest = np.empty(count), None
     spread = partial(np.einsum, "ij,jk,ik->i", optimize=True)
     known = covariance(fit)

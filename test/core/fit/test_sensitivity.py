@@ -12,9 +12,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Layout, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.sensitivity import jacobian, pulled, simulate
-from afm_scan_ros.core.fit.signals import (
-    averaged,
-)
+from afm_scan_ros.core.fit.stretches import means
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
     DAMPING,
@@ -66,7 +64,7 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, sta
     one, operator = signals(drive, 1e-6 * drive, block), layout.operator
     one = evolve(one, rested=rested, unknown=unknown)
     memory = layout.memory_of(theta, one)
-    pieces = operator.pieces(layout.of_operator(theta), drive, block, memory)
+    pieces = operator.pieces(layout.of_operator(theta), drive, one.edges, memory)
     of_pieces = jacobian(layout, theta, one, simulate(layout, theta, one), pieces)
     found = np.concatenate([piece for _, piece in of_pieces])
     known = layout.size - operator.unknowns
@@ -88,8 +86,9 @@ def test_residuals_are_pulled_back_by_the_same_jacobian(
     rested, unknown, order = STARTS[start]
     layout, theta, rng = at_some_theta(kind, order)
     one = evolve(signals(drive, 1e-6 * drive, block), rested=rested, unknown=unknown)
+    one = evolve(one, edges=np.unique([*one.edges[::3], one.edges[-1]]))
     at = layout, theta, one, simulate(layout, theta, one)
-    given = layout.of_operator(theta), drive, block
+    given = layout.of_operator(theta), drive, one.edges
     pieces = list(layout.operator.pieces(*given, layout.memory_of(theta, one)))
     whole = np.concatenate([piece for _, piece in jacobian(*at, pieces)])
     pull = rng.standard_normal(len(whole))
@@ -121,11 +120,12 @@ def test_sensitivities_of_one_state_are_those_of_its_steps(block: int) -> None:
     rng = np.random.default_rng(4)
     operator, path = OneState(-LIMIT, LIMIT, (-0.2, 0.2)), levels(3, 20, 200)
     theta = 2.0 * rng.random(operator.parts["slopes"]) - 0.5
-    found = np.concatenate(list(operator.pieces(theta, path, block, None)))
+    edges = np.cumsum([0, *np.tile([block, 3 * block], len(path) // (4 * block))])
+    found = np.concatenate(list(operator.pieces(theta, path, edges, None)))
     for place in rng.choice(theta.size, 40, replace=False):
         step = 1e-6 * np.eye(theta.size)[place]
         up, down = (operator.output(theta + way * step, path, None) for way in (1.0, -1.0))
-        slope = averaged(up - down, block) / 2e-6
+        slope = means(up - down, edges) / 2e-6
         np.testing.assert_allclose(found[:, place], slope, atol=1e-3 * np.abs(slope).max() + 1e-7)
 
 
@@ -139,7 +139,8 @@ def test_means_of_sensitivities_hold_however_fast_these_fade_or_grow(fading: flo
     now, grown = np.zeros(2), np.zeros(tables.size)
     unknown = np.full(len(path), np.nan)
     each = sensitivities(tables, operator.cells, now.copy(), grown.copy(), path, unknown)[1]
-    means = mean_sensitivities(tables, operator.cells, now, grown, path, 100)
-    expected = each[: 100 * len(means)].reshape(len(means), 100, -1).mean(axis=1)
+    edges = np.arange(0, len(path), 100)
+    found = mean_sensitivities(tables, operator.cells, now, grown, path, edges)
+    expected = means(each, edges)
     largest = np.abs(expected).max(axis=1, keepdims=True)
-    np.testing.assert_allclose(means / largest, expected / largest, atol=1e-11)
+    np.testing.assert_allclose(found / largest, expected / largest, atol=1e-11)

@@ -318,21 +318,21 @@ def sensitivities(
 
 @compiled
 def mean_sensitivities(
-    tables: Array, grid: Grid, now: Array, derivatives: Array, path: Array, block: int
+    tables: Array, grid: Grid, now: Array, derivatives: Array, path: Array, edges: NDArray[np.intp]
 ) -> Array:
-    """Derivatives of w by the tables, as ``sensitivities`` gives, averaged over blocks of a path.
+    """Derivatives of w by the tables, as ``sensitivities`` gives, averaged between edges of a path.
 
-    The shape is (blocks, values).
+    The shape is (edges - 1, values).
     """
-    mean, scales = np.zeros((path.size // block, tables.size)), np.array([1.0, 0.0])
+    mean, scales = np.zeros((edges.size - 1, tables.size)), np.array([1.0, 0.0])
     work = np.empty((4, 2), np.int64), np.empty((4, 2, 4))
     for k in range(mean.shape[0]):
         grown = derivatives, mean[k], scales
-        for j in range(block):
-            _follow(tables, grid, now, grown, work, path[k * block + j])
+        for j in range(edges[k], edges[k + 1]):
+            _follow(tables, grid, now, grown, work, path[j])
             scales[1] += scales[0]
         _rescale(grown)
-        mean[k] /= block
+        mean[k] /= edges[k + 1] - edges[k]
     return mean
 
 
