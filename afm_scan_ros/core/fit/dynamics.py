@@ -216,17 +216,27 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
 
 
 class _HeldBank(NamedTuple):
-    """By the length of a stretch: z, weights of the states in means, and of the input."""
+    """By the length of a stretch: z, and weights in means of states, of the input and its slope.
+
+    ``bends`` is what a unit of slope adds to the states.
+    """
 
     z: Complex
     takes: Complex
     modes: int
     through: Array
+    rises: Array
+    bends: Complex
 
 
 class HeldFilter:
-    """A bank of poles for columns held over stretches, piece by piece; gives means over these.
+    """A bank of poles for columns known by their means over stretches, piece by piece.
 
+    Within a stretch of n samples a column is the line of the slope between its neighbours,
+
+        v_j = v + u_j s,    u_j = (j - (n - 1) / 2) / n,    S = Σ_j u_j z^(n - 1 - j),
+
+    which adds (1 - z) S s to the state after the stretch, and -S s / n to the mean of the state.
     Before the first stretch each column had settled at its value in ``settled``.
     """
 
@@ -244,31 +254,42 @@ class HeldFilter:
         lengths, self._which = np.unique(np.diff(edges), return_inverse=True)
         samples = lengths[:, np.newaxis]
         mean = np.expm1(poles * period * samples) / (samples * np.expm1(poles * period))
+        sums = np.array([_of_slope(np.exp(poles * period), length) for length in lengths])
         self._bank = _HeldBank(
             np.exp(poles * period * samples),
             mean * weights,
             int(np.count_nonzero(poles.imag)),
             direct + np.sum((1.0 - mean) * weights, axis=1).real,
+            -np.sum(sums * weights, axis=1).real / lengths,
+            -np.expm1(poles * period) * sums,
         )
-        self._first = 0
+        middles = np.pad(0.5 * (edges[1:] + edges[:-1]), 1, mode="edge")
+        self._shares = np.diff(edges) / np.maximum(middles[2:] - middles[:-2], 1.0)
+        self._first, self._before = 0, settled
         self._states = np.zeros((2, len(poles), len(settled)))
         self._states[0] = settled
         self._live = settled != 0.0
 
-    def __call__(self, columns: Array) -> Array:
+    def __call__(self, columns: Array, after: Array | None = None) -> Array:
         """Means of the output for the next piece, both (stretches, columns).
 
-        A column that has been zero so far costs nothing.
+        ``after`` is the row that follows the piece, if any. A column that has been zero so far
+        costs nothing.
         """
-        which = self._which[self._first : self._first + len(columns)]
-        self._first += len(columns)
-        if not self._live.all():
-            self._live |= columns.any(axis=0)
+        before = self._before if self._first else columns[0]
+        self._before = columns[-1]
+        part = slice(self._first, self._first + len(columns))
+        self._first = part.stop
+        self._live |= columns.any(axis=0)
+        if after is not None:
+            self._live |= after != 0.0
+        padded = np.vstack([before, columns, columns[-1] if after is None else after])
+        given = self._which[part], self._shares[part], self._bank
         if self._live.all():
-            return _filtered(columns, which, self._bank, *self._states)
+            return _filtered(padded, *given, *self._states)
         result, states = np.zeros(columns.shape), np.compress(self._live, self._states, axis=2)
-        some = np.compress(self._live, columns, axis=1)
-        result[:, self._live] = _filtered(some, which, self._bank, *states)
+        some = np.compress(self._live, padded, axis=1)
+        result[:, self._live] = _filtered(some, *given, *states)
         self._states[:, :, self._live] = states
         return result
 
@@ -278,46 +299,60 @@ class HeldFilter:
         y_s is the mean of the output over stretch s; ``pull`` and the first result have the shape
         (stretches,).
         """
-        return _pulled(pull, self._which, self._bank)
+        return _pulled(pull, self._which, self._shares, self._bank)
+
+
+def _of_slope(z: Complex, samples: int) -> Complex:
+    """S of poles z, (poles,), in a stretch of so many samples."""
+    places = np.arange(samples)[:, np.newaxis]
+    line = (places - 0.5 * (samples - 1)) / samples
+    return np.asarray(np.sum(line * z ** (samples - 1 - places), axis=0))
 
 
 @compiled
-def _pulled(pull: Array, which: Edges, bank: _HeldBank) -> tuple[Array, float]:
-    z, takes, _, through = bank
+def _pulled(pull: Array, which: Edges, shares: Array, bank: _HeldBank) -> tuple[Array, float]:
+    z, takes, _, through, rises, bends = bank
     result, later = np.zeros(pull.size), np.zeros(z.shape[1], np.complex128)
     for s in range(pull.size - 1, -1, -1):
         kind = which[s]
-        total = through[kind] * pull[s]
+        total, slope = through[kind] * pull[s], rises[kind] * pull[s]
         for i in range(z.shape[1]):
             total += ((1.0 - z[kind, i]) * later[i]).real
+            slope += (bends[kind, i] * later[i]).real
             later[i] = z[kind, i] * later[i] + takes[kind, i] * pull[s]
-        result[s] = total
+        result[s] += total
+        result[min(s + 1, pull.size - 1)] += shares[s] * slope
+        result[max(s - 1, 0)] -= shares[s] * slope
     return result, later.real.sum()
 
 
 @compiled
-def _filtered(columns: Array, which: Edges, bank: _HeldBank, real: Array, imag: Array) -> Array:
-    z, takes, modes, through = bank
-    blocks, many = columns.shape
-    result = np.empty((blocks, many))
+def _filtered(
+    padded: Array, which: Edges, shares: Array, bank: _HeldBank, real: Array, imag: Array
+) -> Array:
+    z, takes, modes, through, rises, bends = bank
+    blocks, many = padded.shape[0] - 2, padded.shape[1]
+    result, slope = np.empty((blocks, many)), np.empty(many)
     for b in range(blocks):
         kind = which[b]
         for c in range(many):
-            result[b, c] = through[kind] * columns[b, c]
+            slope[c] = shares[b] * (padded[b + 2, c] - padded[b, c])
+            result[b, c] = through[kind] * padded[b + 1, c] + rises[kind] * slope[c]
         for i in range(modes):
             tr, ti = takes[kind, i].real, takes[kind, i].imag
             zr, zi = z[kind, i].real, z[kind, i].imag
+            sr, si = bends[kind, i].real, bends[kind, i].imag
             for c in range(many):
-                v = columns[b, c]
+                v = padded[b + 1, c]
                 xr, xi = real[i, c], imag[i, c]
                 result[b, c] += tr * xr - ti * xi
                 xr -= v
-                real[i, c] = v + zr * xr - zi * xi
-                imag[i, c] = zr * xi + zi * xr
+                real[i, c] = v + zr * xr - zi * xi + sr * slope[c]
+                imag[i, c] = zr * xi + zi * xr + si * slope[c]
         for i in range(modes, z.shape[1]):
-            tr, zr = takes[kind, i].real, z[kind, i].real
+            tr, zr, sr = takes[kind, i].real, z[kind, i].real, bends[kind, i].real
             for c in range(many):
-                v, xr = columns[b, c], real[i, c]
+                v, xr = padded[b + 1, c], real[i, c]
                 result[b, c] += tr * xr
-                real[i, c] = v + zr * (xr - v)
+                real[i, c] = v + zr * (xr - v) + sr * slope[c]
     return result

@@ -132,7 +132,8 @@ def _of_operator(
     if pieces is None:
         pieces, bends = [np.zeros((len(effective), 0))], bends[:, :0]
     remembered = _remembered(layout, theta, record)
-    bank, first, through = simulation.dynamics.parallel(), 0, None
+    bank, first = simulation.dynamics.parallel(), 0
+    through, waiting = None, np.zeros((0, 0))
     for columns in pieces:
         part, first = slice(first, first + len(columns)), first + len(columns)
         inputs = np.hstack([columns.astype(float), -bends[part], remembered[part]])
@@ -141,7 +142,11 @@ def _of_operator(
             rest = np.zeros(0) if held else _by_rest(layout, theta)
             settled = rest if record.rested else inputs[0]
             through = HeldFilter(bank, 0.0, record.period, record.edges, settled)
-        yield through(inputs)
+        else:
+            yield through(waiting, inputs[0])
+        waiting = inputs
+    if through is not None:
+        yield through(waiting)
 
 
 def _remembered(layout: Layout, theta: Array, record: Signals) -> Array:
