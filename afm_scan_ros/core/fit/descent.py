@@ -51,7 +51,7 @@ def settle(
         fit.weigh()
         heavier = max(1.0, before / fit.discrepancy) ** 2
         fit.remaining = heavier * abs(fit.remaining - fell)
-        chosen = not searching or (near and fit.scales in [scales, *tried])
+        chosen = not (searching and near) or fit.scales in [scales, *tried]
         tried += [scales] if near else []
         if chosen and (fit.converged or fit.stalled):
             break

@@ -96,8 +96,17 @@ class Plays:
     @cached_property
     def rises(self) -> Array:
         """Integrals of the B-splines over the position from the middle, V, (splines, table)."""
-        splines = BSpline(self.knots, np.eye(len(self.knots) - 3), 2).antiderivative()
-        return np.asarray((splines(self.positions) - splines(0.5 * (self.lower + self.upper))).T)
+        risen = self._splines.antiderivative()
+        return np.asarray((risen(self.positions) - risen(0.5 * (self.lower + self.upper))).T)
+
+    @cached_property
+    def _bent(self) -> Array:
+        """Second derivatives of the rises, 1/V, (splines, table)."""
+        return np.asarray(self._splines.derivative()(self.positions).T)
+
+    @property
+    def _splines(self) -> BSpline:
+        return BSpline(self.knots, np.eye(len(self.knots) - 3), 2)
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
@@ -229,21 +238,29 @@ class Plays:
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
-        mean = _means(drive, self.thresholds, self.start(drive, memory), edges)
+        both = _moments(drive, self.thresholds, self.start(drive, memory), edges)
         at_once = self.settings.rows_at_once
-        for first in range(0, len(mean), at_once):
-            yield self._columns(mean[first : first + at_once])
+        for first in range(0, len(edges) - 1, at_once):
+            yield self._columns(*(one[first : first + at_once] for one in both))
 
-    def _columns(self, plays: Array) -> NDArray[np.float32]:
-        mixing = self.widths[:, np.newaxis] * self.blend
-        count = len(self.thresholds)
+    def _columns(self, plays: Array, variances: Array) -> NDArray[np.float32]:
+        """∂P/∂theta of plays (V) that vary by so much (V²) about their means, (stretches, plays).
+
+        The mean of a rise is that at the mean and half the variance times its second derivative.
+        """
         result = np.empty((len(plays), sum(self.parts.values())), np.float32)
+        count = len(self.thresholds)
         result[:, :count] = plays * self.widths
-        place = count - 1 + np.cumsum(self.reached).reshape(self.reached.shape)
-        for j, rise in enumerate(self.rises):
-            some = self.reached[:, j]
-            along = np.interp(plays, self.positions, rise)
-            result[:, place[some, j]] = along @ mixing[:, some]
+        place = np.cumsum(self.reached).reshape(self.reached.shape) - 1
+        place[~self.reached] = -1
+        _correct(
+            result[:, count:],
+            (plays - self.lower) * (len(self.positions) - 1) / (self.upper - self.lower),
+            0.5 * variances,
+            (self.rises.T.copy(), self._bent.T.copy()),
+            self.widths[:, np.newaxis] * self.blend,
+            place,
+        )
         return result
 
     @property
@@ -305,17 +322,59 @@ def _output(
 
 
 @compiled
-def _means(drive: Array, thresholds: Array, plays: Array, edges: Edges) -> Array:
-    result = np.zeros((edges.size - 1, plays.size))
+def _correct(
+    result: NDArray[np.float32],
+    cells: Array,
+    variances: Array,
+    tables: tuple[Array, Array],
+    mixing: Array,
+    place: NDArray[np.intp],
+) -> None:
+    """Derivatives by the correction, whose coefficients have a ``place``, (coarse, splines), or -1.
+
+    ``cells`` are plays in cells of the ``tables`` of the rises and of their second derivatives,
+    (table, splines); ``mixing`` is the share of each coarse threshold, (plays, coarse).
+    """
+    rises, bends = tables
+    last = rises.shape[0] - 2
+    for k in range(cells.shape[0]):
+        total = np.zeros(result.shape[1])
+        for i in range(cells.shape[1]):
+            cell = min(max(int(cells[k, i]), 0), last)
+            part, half = cells[k, i] - cell, variances[k, i]
+            for c in range(mixing.shape[1]):
+                share = mixing[i, c]
+                if share == 0.0:
+                    continue
+                for j in range(rises.shape[1]):
+                    if place[c, j] >= 0:
+                        value = rises[cell, j] + part * (rises[cell + 1, j] - rises[cell, j])
+                        value += half * (
+                            bends[cell, j] + part * (bends[cell + 1, j] - bends[cell, j])
+                        )
+                        total[place[c, j]] += share * value
+        result[k] = total
+
+
+@compiled
+def _moments(drive: Array, thresholds: Array, plays: Array, edges: Edges) -> tuple[Array, Array]:
+    """Means and variances of plays over stretches, both (stretches, plays)."""
+    mean = np.zeros((edges.size - 1, plays.size))
+    variance = np.zeros((edges.size - 1, plays.size))
     for k in range(edges.size - 1):
+        before, count = plays.copy(), edges[k + 1] - edges[k]
         for j in range(edges[k], edges[k + 1]):
             u = drive[j]
             for i in range(plays.size):
                 plays[i] = min(u + thresholds[i], max(u - thresholds[i], plays[i]))
-                result[k, i] += plays[i]
+                moved = plays[i] - before[i]
+                mean[k, i] += moved
+                variance[k, i] += moved * moved
         for i in range(plays.size):
-            result[k, i] /= edges[k + 1] - edges[k]
-    return result
+            mean[k, i] /= count
+            variance[k, i] = max(variance[k, i] / count - mean[k, i] ** 2, 0.0)
+            mean[k, i] += before[i]
+    return mean, variance
 
 
 def _bends(places: Array) -> Array:

@@ -91,18 +91,16 @@ def pulled(
     result[parts["creep"]] = whole @ simulation.response.late
     result[parts["sensor"]] = whole @ _of_sensor(layout, theta, record, simulation)
     if pieces is not None:
-        operator, mapped = layout.operator, layout.map_of(theta)
-        bank, first = simulation.dynamics.parallel(), 0
+        mapped, bank, first = layout.map_of(theta), simulation.dynamics.parallel(), 0
         through = HeldFilter(bank, 0.0, record.period, record.edges, np.zeros(1))
         inputs, settled = through.pulled(whole)
         if record.rested:
             result[: parts["map"].stop] += settled * _by_rest(layout, theta)
         else:
             inputs[0] += settled
-        effective = means(simulation.effective, record.edges)
         if mapped is not None:
-            inputs /= mapped.slope(effective)
-        bends = terms(effective, operator.lower, operator.upper, operator.bends)
+            inputs /= mapped.slope(means(simulation.effective, record.edges))
+        bends = _bends(layout, record, simulation)
         result[parts["map"]] -= inputs @ bends
         result[layout.memory_part(record)] = inputs @ _remembered(layout, theta, record)
         for columns in pieces:
@@ -124,9 +122,8 @@ def _of_operator(
     From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF). Last come
     those by the record's memory, which are alone where the operator is held.
     """
-    operator, mapped = layout.operator, layout.map_of(theta)
-    effective = means(simulation.effective, record.edges)
-    bends = terms(effective, operator.lower, operator.upper, operator.bends)
+    effective, mapped = means(simulation.effective, record.edges), layout.map_of(theta)
+    bends = _bends(layout, record, simulation)
     slopes = np.ones_like(effective) if mapped is None else mapped.slope(effective)
     held = pieces is None
     if pieces is None:
@@ -147,6 +144,13 @@ def _of_operator(
         waiting = inputs
     if through is not None:
         yield through(waiting)
+
+
+def _bends(layout: Layout, record: Signals, simulation: Simulation) -> Array:
+    """Means of the map's terms q_j(F) over stretches, (stretches, terms)."""
+    operator = layout.operator
+    every = terms(simulation.effective, operator.lower, operator.upper, operator.bends)
+    return means(every, record.edges)
 
 
 def _remembered(layout: Layout, theta: Array, record: Signals) -> Array:

@@ -429,6 +429,12 @@ class FitSettings:
         "excess of what a stretch hides of the displacement, over that of noise",
         "by chance once in a thousand windows",
     )
+    smooth_move: float = setting(
+        0.02,
+        "half range",
+        "longest way of the drive within a stretch",
+        "a sixth of a cell of the correction, whose means are then known to 0.4 %",
+    )
     smooth_drive: float = setting(
         0.05,
         "1",

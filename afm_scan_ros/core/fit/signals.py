@@ -119,11 +119,13 @@ def signals_of(
     period: float,
     *,
     depolarised: bool,
+    half: float,
     settings: FitSettings,
 ) -> Signals:
-    """Choose the blocks of a record, and from where on it counts.
+    """Choose the blocks and stretches of a record, and from where on it counts.
 
-    What comes before its memory is known is left out, unless that is most of it.
+    What comes before its memory is known is left out, unless that is most of it. ``half`` is half
+    the range (V) of the operator.
     """
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
@@ -135,7 +137,8 @@ def signals_of(
     first = known_from(drive, settings, depolarised=depolarised)
     first = first if first < settings.most_left_out * len(drive) else 0
     both = averaged(drive, block), averaged(displacement, block)
-    edges = block * smooth_edges(*both, noise / np.sqrt(block), -(-first // block), settings)
+    quiet, begins = noise / np.sqrt(block), -(-first // block)
+    edges = block * smooth_edges(*both, quiet, half, begins, settings)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
 
 

@@ -39,15 +39,21 @@ def means(signal: Array, edges: Edges) -> Array:
 
 
 def smooth_edges(
-    drive: Array, displacement: Array, noise: float, first: int, settings: FitSettings
+    drive: Array,
+    displacement: Array,
+    noise: float,
+    half: float,
+    first: int,
+    settings: FitSettings,
 ) -> Edges:
     """Edges of the longest stretches, of powers of two, over which both signals are smooth.
 
-    Both have the shape (n,); ``noise`` is the standard deviation of the displacement (m). Sample
-    ``first`` begins a stretch.
+    Both have the shape (n,); ``noise`` is the standard deviation of the displacement (m), ``half``
+    half the range (V) of the operator. Sample ``first`` begins a stretch.
     """
     longest = max(len(drive) // settings.smooth_window, 1).bit_length()
-    test = _Smoothness(drive, displacement, noise, settings.bend * float(np.std(drive)), settings)
+    least, most = settings.bend * float(np.std(drive)), settings.smooth_move * half
+    test = _Smoothness(drive, displacement, noise, least, most, settings)
     parts = (0, first), (first, len(drive))
     found = [edge for part in parts for edge in test.split(*part, 1 << longest)]
     return np.array([*found, len(drive)], np.intp)
@@ -55,12 +61,16 @@ def smooth_edges(
 
 @frozen(eq=False)
 class _Smoothness:
-    """A test of signals, of which the drive's details may have a ``least`` size (V)."""
+    """A test of signals, of which the drive's details may have a ``least`` size (V).
+
+    Within a stretch the drive moves by ``most`` (V) at most.
+    """
 
     drive: Array
     displacement: Array
     noise: float
     least: float
+    most: float
     settings: FitSettings
 
     def split(self, first: int, last: int, length: int) -> Iterator[int]:
@@ -79,6 +89,8 @@ class _Smoothness:
         A sine that is faster than a length does not show in means over it.
         """
         settings, half = self.settings, length // 2
+        if np.ptp(self.drive[start:end].reshape(-1, length), axis=1).max() > self.most:
+            return False
         before = half * min(2 * settings.smooth_age, start // half)
         near = slice(start - before, min(end + 4 * half, len(self.drive)))
         drive, displacement = self.drive[near], self.displacement[near]

@@ -55,6 +55,7 @@ LONG = {
         "small_scans",
         "from_scans",
         "planned",
+        "random_levels",
         "scanners",
     ),
     "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),

@@ -15,7 +15,7 @@ TIMES = np.arange(40_000)
 
 def edges_of(drive: Array, moved: Array, first: int = 0, seed: int = 1) -> Array:
     noise = np.random.default_rng(seed).normal(0.0, NOISE, len(drive))
-    return smooth_edges(drive, moved + noise, NOISE, first, SETTINGS)
+    return smooth_edges(drive, moved + noise, NOISE, 100.0, first, SETTINGS)
 
 
 @given(st.integers(0, 4000), st.integers(1, 4000), st.integers(0, 2**32 - 1))
@@ -23,7 +23,7 @@ def test_stretches_hold_each_sample_once_and_begin_at_the_first_that_counts(
     first: int, more: int, seed: int
 ) -> None:
     drive = np.random.default_rng(seed).standard_normal(first + more).cumsum()
-    edges = smooth_edges(drive, 1e-6 * drive, NOISE, first, SETTINGS)
+    edges = smooth_edges(drive, 1e-6 * drive, NOISE, 1.0, first, SETTINGS)
     lengths = np.diff(edges)
     assert (edges[0], edges[-1]) == (0, len(drive))
     assert (lengths > 0).all()
@@ -55,6 +55,14 @@ def test_stretches_after_a_step_are_no_longer_than_a_part_of_the_time_since() ->
     assert (lengths[longer] <= (begins[longer] - 10_000) / SETTINGS.smooth_age).all()
     assert lengths[later].max() >= 64
     assert not lengths[(begins > 9_990) & (begins < 10_000)].max() > 1
+
+
+def test_the_drive_moves_little_within_a_stretch() -> None:
+    """The rises of plays are no lines of the drive, however straight that is."""
+    drive = np.linspace(-1.0, 1.0, 40_000)
+    edges = smooth_edges(drive, 0.0 * drive, NOISE, 1.0, 0, SETTINGS)
+    longest = np.diff(drive[np.minimum(edges, len(drive) - 1)]).max()
+    assert 0.5 * SETTINGS.smooth_move < longest <= SETTINGS.smooth_move + 1e-4
 
 
 def test_means_are_those_of_each_stretch() -> None:
