@@ -114,7 +114,7 @@ class ScannerNode(ManagedConsumer):
     def step(self) -> bool:
         """Keep the driver running while no error is found."""
         try:
-            self._drive()
+            self._serve_driver()
         except ScanError as error:  # the driver may be the first to miss what another node owes
             raise ScanError(f"{error}{self._missing()}") from error
         return super().step() or bool(self._moving)
@@ -155,7 +155,7 @@ class ScannerNode(ManagedConsumer):
             return reason
         return outcome if outcome.startswith(reason) else f"{outcome}; {reason}"
 
-    def _drive(self) -> None:
+    def _serve_driver(self) -> None:
         """Show the driver that the node lives, and exchange blocks with it."""
         if self._is_open:
             self._driver.show_life()

@@ -120,7 +120,9 @@ def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
 
 
 def signals(drive: Array, moved: Array, block: int) -> Signals:
-    found = signals_of("a", drive, moved, PERIOD, depolarised=True, half=LIMIT, settings=SETTINGS)
+    found = signals_of(
+        "a", drive, moved, PERIOD, depolarised=True, half_range=LIMIT, settings=SETTINGS
+    )
     return evolve(found, block=block, edges=block * np.arange(len(drive) // block + 1))
 
 

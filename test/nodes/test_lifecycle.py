@@ -148,7 +148,7 @@ class Faulty(PiezoscannerSim):
 class Starving(PiezoscannerSim):
     """Its driver is the first to miss the drive."""
 
-    def _drive(self) -> None:
+    def _serve_driver(self) -> None:
         self._advanced -= 10.0
         raise ScanError("no drive for 0.35 s")
 

@@ -116,7 +116,7 @@ def _compared(
 
 def _longest_correlation(fit: AxisFit) -> float:
     """Blocks of the most correlated residual that tell as much as one independent block."""
-    return max(map(correlation_length, fit.residuals(fit.simulated(fit.theta))))
+    return max(map(correlation_length, fit.residuals()))
 
 
 def _lead(fit: AxisFit, other: AxisFit) -> float:

@@ -110,7 +110,7 @@ def started(records: Sequence[Record], axis: str, settings: FitSettings) -> Axis
             record.displacement[:, 0],
             record.sample_period,
             depolarised=record.depolarised,
-            half=operator.half,
+            half_range=operator.half,
             settings=settings,
         )
         for record, drive in zip(given, drives, strict=True)

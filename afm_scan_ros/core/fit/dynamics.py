@@ -215,21 +215,23 @@ def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not obje
     return output, modes, changes, lags, late
 
 
-class _HeldBank(NamedTuple):
-    """By the length of a stretch: z, and weights in means of states, of the input and its slope.
+class _StretchBank(NamedTuple):
+    """A bank by the length of a stretch, of which the complex poles, ``modes`` many, come first.
 
-    ``bends`` is what a unit of slope adds to the states.
+    The mean over a stretch holds the states before it, the mean of the input and its slope with the
+    weights ``of_states``, ``of_input`` and ``of_slope``. After it the states have decayed by ``z``
+    towards that mean, and a unit of slope has moved them by ``shifts``.
     """
 
     z: Complex
-    takes: Complex
+    of_states: Complex
     modes: int
-    through: Array
-    rises: Array
-    bends: Complex
+    of_input: Array
+    of_slope: Array
+    shifts: Complex
 
 
-class HeldFilter:
+class StretchFilter:
     """A bank of poles for columns known by their means over stretches, piece by piece.
 
     Within a stretch of n samples a column is the line of the slope between its neighbours,
@@ -255,7 +257,7 @@ class HeldFilter:
         samples = lengths[:, np.newaxis]
         mean = np.expm1(poles * period * samples) / (samples * np.expm1(poles * period))
         sums = np.array([_of_slope(np.exp(poles * period), length) for length in lengths])
-        self._bank = _HeldBank(
+        self._bank = _StretchBank(
             np.exp(poles * period * samples),
             mean * weights,
             int(np.count_nonzero(poles.imag)),
@@ -310,16 +312,16 @@ def _of_slope(z: Complex, samples: int) -> Complex:
 
 
 @compiled
-def _pulled(pull: Array, which: Edges, shares: Array, bank: _HeldBank) -> tuple[Array, float]:
-    z, takes, _, through, rises, bends = bank
+def _pulled(pull: Array, which: Edges, shares: Array, bank: _StretchBank) -> tuple[Array, float]:
+    z, of_states, _, of_input, of_slope, shifts = bank
     result, later = np.zeros(pull.size), np.zeros(z.shape[1], np.complex128)
     for s in range(pull.size - 1, -1, -1):
         kind = which[s]
-        total, slope = through[kind] * pull[s], rises[kind] * pull[s]
+        total, slope = of_input[kind] * pull[s], of_slope[kind] * pull[s]
         for i in range(z.shape[1]):
             total += ((1.0 - z[kind, i]) * later[i]).real
-            slope += (bends[kind, i] * later[i]).real
-            later[i] = z[kind, i] * later[i] + takes[kind, i] * pull[s]
+            slope += (shifts[kind, i] * later[i]).real
+            later[i] = z[kind, i] * later[i] + of_states[kind, i] * pull[s]
         result[s] += total
         result[min(s + 1, pull.size - 1)] += shares[s] * slope
         result[max(s - 1, 0)] -= shares[s] * slope
@@ -328,20 +330,20 @@ def _pulled(pull: Array, which: Edges, shares: Array, bank: _HeldBank) -> tuple[
 
 @compiled
 def _filtered(
-    padded: Array, which: Edges, shares: Array, bank: _HeldBank, real: Array, imag: Array
+    padded: Array, which: Edges, shares: Array, bank: _StretchBank, real: Array, imag: Array
 ) -> Array:
-    z, takes, modes, through, rises, bends = bank
-    blocks, many = padded.shape[0] - 2, padded.shape[1]
-    result, slope = np.empty((blocks, many)), np.empty(many)
-    for b in range(blocks):
+    z, of_states, modes, of_input, of_slope, shifts = bank
+    stretches, many = padded.shape[0] - 2, padded.shape[1]
+    result, slope = np.empty((stretches, many)), np.empty(many)
+    for b in range(stretches):
         kind = which[b]
         for c in range(many):
             slope[c] = shares[b] * (padded[b + 2, c] - padded[b, c])
-            result[b, c] = through[kind] * padded[b + 1, c] + rises[kind] * slope[c]
+            result[b, c] = of_input[kind] * padded[b + 1, c] + of_slope[kind] * slope[c]
         for i in range(modes):
-            tr, ti = takes[kind, i].real, takes[kind, i].imag
+            tr, ti = of_states[kind, i].real, of_states[kind, i].imag
             zr, zi = z[kind, i].real, z[kind, i].imag
-            sr, si = bends[kind, i].real, bends[kind, i].imag
+            sr, si = shifts[kind, i].real, shifts[kind, i].imag
             for c in range(many):
                 v = padded[b + 1, c]
                 xr, xi = real[i, c], imag[i, c]
@@ -350,7 +352,7 @@ def _filtered(
                 real[i, c] = v + zr * xr - zi * xi + sr * slope[c]
                 imag[i, c] = zr * xi + zi * xr + si * slope[c]
         for i in range(modes, z.shape[1]):
-            tr, zr, sr = takes[kind, i].real, z[kind, i].real, bends[kind, i].real
+            tr, zr, sr = of_states[kind, i].real, z[kind, i].real, shifts[kind, i].real
             for c in range(many):
                 v, xr = padded[b + 1, c], real[i, c]
                 result[b, c] += tr * xr

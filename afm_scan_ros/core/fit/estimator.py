@@ -10,7 +10,7 @@ creep from before it) is linear and eliminated. The Jacobian holds inputs over b
 does not: so a step is approximate, and what it leads to is exact.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -120,23 +120,21 @@ class AxisFit:
             self._last = self.layout, theta, every
         return self._last[2]
 
-    def _without(
-        self, simulations: Sequence[Simulation], *, gathered: bool = False
-    ) -> Iterator[tuple[Array, Array]]:
+    def _without(self, theta: Array, *, gathered: bool) -> Iterator[tuple[Array, Array]]:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
-        for k, (record, simulation) in enumerate(zip(self.records, simulations, strict=True)):
+        pairs = zip(self.records, self.simulated(theta), strict=True)
+        for k, (record, simulation) in enumerate(pairs):
             left = record.mean - self.gain * simulation.response.output[record.used]
             left = record.gathered(left) if gathered else left
             yield left, self.free_of(k, gathered=gathered).without(left)
 
-    def residuals(self, simulations: Sequence[Simulation]) -> list[Array]:
+    def residuals(self) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
-        return [residual for _, residual in self._without(simulations)]
+        return [residual for _, residual in self._without(self.theta, gathered=False)]
 
     def gathered(self) -> list[Array]:
-        """Residuals (m) of the stretches that count, as ``Signals.gathered``, at θ."""
-        pairs = self._without(self.simulated(self.theta), gathered=True)
-        return [residual for _, residual in pairs]
+        """Residuals (m) of the stretches that count, as ``Signals.gathered``."""
+        return [residual for _, residual in self._without(self.theta, gathered=True)]
 
     def misfit(self, theta: Array, *, gathered: bool = True) -> float:
         """Half the weighted sum of squared residuals, and of squared weights of what is free.
@@ -144,8 +142,7 @@ class AxisFit:
         These are fitted, so that both together are half of what the model leaves times what remains
         of that. Residuals are those ``gathered`` over stretches, or else of blocks.
         """
-        lefts = self._without(self.simulated(theta), gathered=gathered)
-        pairs = zip(self.records, lefts, strict=True)
+        pairs = zip(self.records, self._without(theta, gathered=gathered), strict=True)
         return sum(0.5 * float(a @ b) / self.variance(record) for record, (a, b) in pairs)
 
     def objective(self, theta: Array) -> float:
@@ -261,7 +258,7 @@ class AxisFit:
     def weigh(self) -> None:
         """Estimate the noise of records whose blocks are samples, and η: the likeliest."""
         parts = []
-        for k, left in enumerate(self.residuals(self.simulated(self.theta))):
+        for k, left in enumerate(self.residuals()):
             record = self.records[k]
             if record.block == 1:
                 record = self.records[k] = evolve(record, noise=noise_of(left))
@@ -283,7 +280,7 @@ class AxisFit:
         """
         settings = self.layout.settings
         simulations, before = self.simulated(self.theta), [one.tones for one in self.records]
-        lefts = self.residuals(simulations)
+        lefts = self.residuals()
         for k, left in enumerate(lefts):
             record = self.records[k]
             motion = self.gain * simulations[k].response.output[record.used]
@@ -304,9 +301,9 @@ class AxisFit:
     def tone_amplitudes(self) -> list[tuple[tuple[float, float], ...]]:
         """Frequency (Hz) and amplitude (m), in the middle of the record, of each record's tones."""
         found = []
-        lefts = self._without(self.simulated(self.theta))
+        lefts = self._without(self.theta, gathered=False)
         for k, (record, (left, _)) in enumerate(zip(self.records, lefts, strict=True)):
-            free = self.free_of(k)
+            free = self.free_of(k, gathered=False)
             weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
             sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
             found.append(tuple(zip(record.tones, map(float, sizes), strict=True)))
@@ -323,7 +320,7 @@ class AxisFit:
         for name in (*layout.operator.parts, "map", "sensor", "memory"):
             self.theta[layout.parts[name]] = theta[before[name]]
 
-    def free_of(self, k: int, *, gathered: bool = False) -> Free:
+    def free_of(self, k: int, *, gathered: bool) -> Free:
         """What is free in a record, by blocks or ``gathered`` over stretches.
 
         The regressors are kept while they stay the same.

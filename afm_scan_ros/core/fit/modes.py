@@ -168,7 +168,7 @@ def _band(fit: AxisFit) -> tuple[float, float]:
 def _spectra(fit: AxisFit) -> list[Spectrum]:
     """Spectra of what is left of each record, over what noise leaves in a bin."""
     found: list[Spectrum] = []
-    for record, left in zip(fit.records, fit.residuals(fit.simulated(fit.theta)), strict=True):
+    for record, left in zip(fit.records, fit.residuals(), strict=True):
         at = 2.0 * np.pi * np.fft.rfftfreq(len(left), record.length)
         window = np.hanning(len(left))
         noise = float(window @ window) * fit.variance(record)

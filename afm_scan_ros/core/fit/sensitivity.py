@@ -6,7 +6,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
-from afm_scan_ros.core.fit.dynamics import HeldFilter, PoleBank, Response, respond
+from afm_scan_ros.core.fit.dynamics import PoleBank, Response, StretchFilter, respond
 from afm_scan_ros.core.fit.parameters import Columns, Layout
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.stretches import means
@@ -92,7 +92,7 @@ def pulled(
     result[parts["sensor"]] = whole @ _of_sensor(layout, theta, record, simulation)
     if pieces is not None:
         mapped, bank, first = layout.map_of(theta), simulation.dynamics.parallel(), 0
-        through = HeldFilter(bank, 0.0, record.period, record.edges, np.zeros(1))
+        through = StretchFilter(bank, 0.0, record.period, record.edges, np.zeros(1))
         inputs, settled = through.pulled(whole)
         if record.rested:
             result[: parts["map"].stop] += settled * _by_rest(layout, theta)
@@ -117,7 +117,7 @@ def _of_operator(
     simulation: Simulation,
     pieces: Iterable[Columns] | None,
 ) -> Iterator[Array]:
-    """Derivatives by the operator and its map, as inputs held over blocks, through V and C.
+    """Derivatives by the operator and its map, as inputs known over stretches, through V and C.
 
     From A = F + Σ c_j q_j(F) follow ∂F/∂A = 1 / (dA/dF) and ∂F/∂c_j = -q_j(F) / (dA/dF). Last come
     those by the record's memory, which are alone where the operator is held.
@@ -138,7 +138,7 @@ def _of_operator(
         if through is None:
             rest = np.zeros(0) if held else _by_rest(layout, theta)
             settled = rest if record.rested else inputs[0]
-            through = HeldFilter(bank, 0.0, record.period, record.edges, settled)
+            through = StretchFilter(bank, 0.0, record.period, record.edges, settled)
         else:
             yield through(waiting, inputs[0])
         waiting = inputs
@@ -195,7 +195,7 @@ def of_vibration(layout: Layout, theta: Array, record: Signals, simulation: Simu
         settled.append(np.array([0.0, 0.0, simulation.settled, 0.0]))
     slow = (-1.0 / layout.time_constants).astype(np.complex128)
     bank = slow, dynamics.gains.astype(np.complex128)
-    creep = HeldFilter(bank, 1.0, record.period, record.edges, np.concatenate(settled))
+    creep = StretchFilter(bank, 1.0, record.period, record.edges, np.concatenate(settled))
     return creep(np.hstack(columns))
 
 

@@ -119,13 +119,13 @@ def signals_of(
     period: float,
     *,
     depolarised: bool,
-    half: float,
+    half_range: float,
     settings: FitSettings,
 ) -> Signals:
     """Choose the blocks and stretches of a record, and from where on it counts.
 
-    What comes before its memory is known is left out, unless that is most of it. ``half`` is half
-    the range (V) of the operator.
+    What comes before its memory is known is left out, unless that is most of it. ``half_range`` is
+    that of the operator (V).
     """
     noise = noise_of(displacement)
     block = longest_block(drive, displacement, noise, settings)
@@ -138,7 +138,7 @@ def signals_of(
     first = first if first < settings.most_left_out * len(drive) else 0
     both = averaged(drive, block), averaged(displacement, block)
     quiet, begins = noise / np.sqrt(block), -(-first // block)
-    edges = block * smooth_edges(*both, quiet, half, begins, settings)
+    edges = block * smooth_edges(*both, quiet, half_range, begins, settings)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
 
 

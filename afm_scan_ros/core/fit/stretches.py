@@ -22,8 +22,8 @@ from afm_scan_ros.core.types import Array
 Edges = NDArray[np.intp]
 """Where each stretch begins, and where the last one ends, (stretches + 1,)."""
 
-WHITE = 0.5 + (22.0**2 + 3.0**2) / 128.0**2
-"""Variance of a detail of white noise, over that of a mean of n samples."""
+FORETOLD = np.array([-3.0, 22.0, 0.0, -22.0, 3.0]) / 128.0
+"""Weights of m_{k-2} to m_{k+2} in p_k."""
 
 
 def averaged(signal: Array, block: int) -> Array:
@@ -42,17 +42,17 @@ def smooth_edges(
     drive: Array,
     displacement: Array,
     noise: float,
-    half: float,
+    half_range: float,
     first: int,
     settings: FitSettings,
 ) -> Edges:
     """Edges of the longest stretches, of powers of two, over which both signals are smooth.
 
-    Both have the shape (n,); ``noise`` is the standard deviation of the displacement (m), ``half``
-    half the range (V) of the operator. Sample ``first`` begins a stretch.
+    Both have the shape (n,); ``noise`` is the standard deviation of the displacement (m),
+    ``half_range`` that of the operator (V). Sample ``first`` begins a stretch.
     """
     longest = max(len(drive) // settings.smooth_window, 1).bit_length()
-    least, most = settings.bend * float(np.std(drive)), settings.smooth_move * half
+    least, most = settings.bend * float(np.std(drive)), settings.smooth_move * half_range
     test = _Smoothness(drive, displacement, noise, least, most, settings)
     parts = (0, first), (first, len(drive))
     found = [edge for part in parts for edge in test.split(*part, 1 << longest)]
@@ -95,17 +95,14 @@ class _Smoothness:
         near = slice(start - before, min(end + 4 * half, len(self.drive)))
         drive, displacement = self.drive[near], self.displacement[near]
         least = (settings.smooth_drive * np.std(drive)) ** 2 + self.least**2
-        samples = 1
+        samples, white = 1, 0.5 + 0.5 * float(FORETOLD @ FORETOLD)
         while samples < length:
             moved, driven = (np.mean(_details(one) ** 2) for one in (displacement, drive))
             uncertain = settings.smooth_sigma * np.sqrt(4.0 / len(drive))
-            if moved > (1.0 + uncertain) * WHITE * self.noise**2 / samples or driven > least:
+            if moved > (1.0 + uncertain) * white * self.noise**2 / samples or driven > least:
                 return False
-            drive, displacement, samples = (
-                averaged(drive, 2),
-                averaged(displacement, 2),
-                2 * samples,
-            )
+            drive, displacement = averaged(drive, 2), averaged(displacement, 2)
+            samples *= 2
         return True
 
 
@@ -113,5 +110,4 @@ def _details(signal: Array) -> Array:
     """Half the difference of both halves of each pair, less what the means foretell of it."""
     pairs = signal[: len(signal) // 2 * 2].reshape(-1, 2)
     mean, half = pairs.mean(axis=1), 0.5 * (pairs[:, 0] - pairs[:, 1])
-    next_two = mean[1:-3] - mean[3:-1], mean[:-4] - mean[4:]
-    return np.asarray(half[2:-2] - (22.0 * next_two[0] - 3.0 * next_two[1]) / 128.0)
+    return np.asarray(half[2:-2] - np.correlate(mean, FORETOLD, "valid"))

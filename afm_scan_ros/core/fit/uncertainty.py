@@ -32,7 +32,7 @@ class PredictedMotion:
 
 def information(fit: AxisFit) -> Array:
     """H of the normal equations, as if samples whose residuals are alike were one sample."""
-    lefts = fit.residuals(fit.simulated(fit.theta))
+    lefts = fit.residuals()
     matrix = np.zeros((fit.layout.size,) * 2)
     for k, left in enumerate(lefts):
         given = fit.records[k].gathered(left), fit.columns(k, with_operator=True)

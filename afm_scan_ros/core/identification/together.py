@@ -77,7 +77,7 @@ def identify_together(
     for one in fitting:
         error = validate_from(model, _in_step(one, axis), one.name, 0).model_discrepancy
         known.append(of_fitted(error, fit.discrepancy))
-    left = fit.residuals(fit.simulated(fit.theta))
+    left = fit.residuals()
     return FittedAxis(
         model=model.also_known(known),
         operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",

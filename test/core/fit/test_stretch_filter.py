@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.fit.dynamics import HeldFilter
+from afm_scan_ros.core.fit.dynamics import StretchFilter
 from afm_scan_ros.core.fit.stretches import Edges, means
 from afm_scan_ros.core.types import Array
 
@@ -28,7 +28,7 @@ def of_samples(inputs: Array, settled: float) -> Array:
 
 def error_of(inputs: Array, edges: Edges) -> float:
     """Largest error over the largest output, but for the end, whose slope is one-sided."""
-    found = HeldFilter((POLES, WEIGHTS), 0.0, PERIOD, edges, inputs[:1])
+    found = StretchFilter((POLES, WEIGHTS), 0.0, PERIOD, edges, inputs[:1])
     pieces = np.array_split(means(inputs, edges)[:, np.newaxis], 3)
     following = [pieces[1][0], pieces[2][0], None]
     output = np.concatenate([found(*each) for each in zip(pieces, following, strict=True)])[:, 0]
