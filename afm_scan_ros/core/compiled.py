@@ -4,7 +4,7 @@ Numba keeps the machine code beside the source, or in the user's cache where tha
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache, cached_property, update_wrapper
 from types import ModuleType
 from typing import Generic, Literal, ParamSpec, TypeVar
@@ -54,9 +54,14 @@ class Compiled(Generic[P, R]):
     Importing numba takes longer than many a command does, most of which call no loop.
     """
 
-    def __init__(self, function: Callable[P, R], inline: Literal["never", "always"]) -> None:
+    def __init__(
+        self,
+        function: Callable[P, R],
+        inline: Literal["never", "always"] = "never",
+        regroups: Collection[str] = (),
+    ) -> None:
         update_wrapper(self, function)
-        self._inline = inline
+        self._inline, self._regroups = inline, set(regroups)
         # Where another loop calls this one, numba looks for these names.
         self.py_func, self.targetoptions = function, {"inline": inline}
 
@@ -68,9 +73,8 @@ class Compiled(Generic[P, R]):
     def _machine_code(self) -> Callable[P, R]:
         numba = _numba()
         _announce_compilation()
-        result: Callable[P, R] = numba.njit(cache=True, nogil=True, inline=self._inline)(
-            self.py_func
-        )
+        options = {"inline": self._inline, "fastmath": self._regroups}
+        result: Callable[P, R] = numba.njit(cache=True, nogil=True, **options)(self.py_func)
         return result
 
     @cached_property
@@ -81,7 +85,15 @@ class Compiled(Generic[P, R]):
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function of arrays and scalars to machine code, kept on disk between runs."""
-    return Compiled(function, "never")
+    return Compiled(function)
+
+
+def regrouped(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a loop whose sums may be taken in any order, several at a time.
+
+    Its results differ by rounding from those in the order as written.
+    """
+    return Compiled(function, regroups=("reassoc", "contract", "nsz"))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:

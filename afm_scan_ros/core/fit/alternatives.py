@@ -15,8 +15,8 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
-from afm_scan_ros.core.fit.sensitivity import at_rest
 from afm_scan_ros.core.fit.signals import correlation_length
+from afm_scan_ros.core.fit.simulation import at_rest
 from afm_scan_ros.core.fit.starts import begun_at_rest, counted_from_rest
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback

@@ -10,19 +10,31 @@ displacement k depends on inputs up to k - 1:
 """
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
 
 Complex = NDArray[np.complex128]
+
+
+@frozen(eq=False)
+class States:
+    """Means over stretches of what the derivatives of y hold.
+
+    ``modes`` x_i and ``changes`` ∂x_i/∂p_i, shape (stretches, modes), and ``lags`` x_i (stretches,
+    lags) are before the creep; ``late`` (stretches, time constants) is what each creep element
+    makes of V's output.
+    """
+
+    modes: Complex
+    changes: Complex
+    lags: Array
+    late: Array
 
 
 @frozen(eq=False)
@@ -61,8 +73,8 @@ class PoleBank:
         fast = whole.weights * self._creep(whole.poles)
         return np.concatenate([whole.poles, slow]), np.concatenate([fast, late])
 
-    def seen(self, response: "Response") -> tuple[Complex, Complex, Array]:
-        """States of V's poles as the sensor reads them: ``Response.modes, changes, lags`` of M x_i.
+    def seen(self, states: States) -> tuple[Complex, Complex, Array]:
+        """``modes, changes, lags`` of V's poles as the sensor reads them: those of M x_i.
 
         Of a pole p, with the poles q of M and their weights κ,
 
@@ -71,15 +83,15 @@ class PoleBank:
         where Re_q is half the sum of a term and of that with q and κ conjugate.
         """
         if not len(self.sensor[0]):
-            return response.modes, response.changes, response.lags
-        states, count = response.modes[:, self.modes :], self.modes
-        x = np.concatenate([response.modes[:, :count], response.lags], axis=1)
-        d = np.concatenate([response.changes[:, :count], np.zeros_like(response.lags)], axis=1)
+            return states.modes, states.changes, states.lags
+        sensor, count = states.modes[:, self.modes :], self.modes
+        x = np.concatenate([states.modes[:, :count], states.lags], axis=1)
+        d = np.concatenate([states.changes[:, :count], np.zeros_like(states.lags)], axis=1)
         p = self.poles[:, np.newaxis]
         seen, changes = x * _at(self.sensor, self.poles), d * _at(self.sensor, self.poles)
         for q, weight, state in (
-            (*self.sensor, states),
-            (*(one.conj() for one in self.sensor), states.conj()),
+            (*self.sensor, sensor),
+            (*(one.conj() for one in self.sensor), sensor.conj()),
         ):
             apart = 1.0 - q / p
             seen += 0.5 * state @ (weight / apart).T
@@ -128,233 +140,3 @@ def _product(
         return one
     weights = np.concatenate([one[1] * _at(other, one[0]), other[1] * _at(one, other[0])])
     return np.concatenate([one[0], other[0]]), weights
-
-
-@frozen(eq=False)
-class Response:
-    """Means of y over blocks, shape (blocks,), and over stretches of what its derivatives hold.
-
-    ``modes`` x_i and ``changes`` ∂x_i/∂p_i, shape (stretches, modes), and ``lags`` x_i (stretches,
-    lags) are before the creep; ``late`` (stretches, time constants) is what each creep element
-    makes of V's output.
-    """
-
-    output: Array
-    modes: Complex
-    changes: Complex
-    lags: Array
-    late: Array
-
-
-def respond(
-    dynamics: PoleBank, period: float, inputs: Array, block: int, edges: Edges, settled: float
-) -> Response:
-    """Response to inputs (n,), of a scanner that has settled under the input ``settled``.
-
-    ``edges`` of the stretches are multiples of ``block``.
-    """
-    dynamics = dynamics.read()
-    z, count = np.exp(dynamics.poles * period), dynamics.modes
-    slow = np.exp(-period / dynamics.time_constants)
-    modes = z[:count], dynamics.weights[:count]
-    lags = z[count:].real.copy(), dynamics.weights[count:].real.copy()
-    creep = slow, dynamics.gains
-    return Response(*_respond(*modes, *lags, *creep, period, inputs, block, edges, settled))
-
-
-@compiled
-def _respond(  # noqa: PLR0913, PLR0917 - a compiled loop takes arrays, not objects
-    z: Complex,
-    weights: Complex,
-    fast: Array,
-    shares: Array,
-    slow: Array,
-    gains: Array,
-    period: float,
-    inputs: Array,
-    block: int,
-    edges: Edges,
-    settled: float,
-) -> tuple[Array, Complex, Complex, Array, Array]:
-    blocks, stretches = inputs.size // block, edges.size - 1
-    output, lags, late = (
-        np.zeros(blocks),
-        np.zeros((stretches, fast.size)),
-        np.zeros((stretches, slow.size)),
-    )
-    modes = np.zeros((stretches, z.size), np.complex128)
-    changes = np.zeros((stretches, z.size), np.complex128)
-    x, d = np.full(z.size, settled + 0j), np.zeros(z.size, np.complex128)
-    lag, c = np.full(fast.size, settled), np.full(slow.size, settled)
-    c *= weights.real.sum() + shares.sum()
-    for b in range(stretches):
-        for k in range(edges[b], edges[b + 1]):
-            v, y = inputs[k], 0.0
-            for i in range(z.size):
-                y += weights[i].real * x[i].real - weights[i].imag * x[i].imag
-                modes[b, i] += x[i]
-                changes[b, i] += d[i]
-                d[i] = z[i] * (d[i] + period * (x[i] - v))
-                x[i] = v + z[i] * (x[i] - v)
-            for i in range(fast.size):
-                y += shares[i] * lag[i]
-                lags[b, i] += lag[i]
-                lag[i] = v + fast[i] * (lag[i] - v)
-            total = y
-            for j in range(slow.size):
-                total += gains[j] * c[j]
-                late[b, j] += c[j]
-                c[j] = y + slow[j] * (c[j] - y)
-            output[k // block] += total
-        share = 1.0 / (edges[b + 1] - edges[b])
-        modes[b] *= share
-        changes[b] *= share
-        lags[b] *= share
-        late[b] *= share
-    output /= block
-    return output, modes, changes, lags, late
-
-
-class _StretchBank(NamedTuple):
-    """A bank by the length of a stretch, of which the complex poles, ``modes`` many, come first.
-
-    The mean over a stretch holds the states before it, the mean of the input and its slope with the
-    weights ``of_states``, ``of_input`` and ``of_slope``. After it the states have decayed by ``z``
-    towards that mean, and a unit of slope has moved them by ``shifts``.
-    """
-
-    z: Complex
-    of_states: Complex
-    modes: int
-    of_input: Array
-    of_slope: Array
-    shifts: Complex
-
-
-class StretchFilter:
-    """A bank of poles for columns known by their means over stretches, piece by piece.
-
-    Within a stretch of n samples a column is the line of the slope between its neighbours,
-
-        v_j = v + u_j s,    u_j = (j - (n - 1) / 2) / n,    S = Σ_j u_j z^(n - 1 - j),
-
-    which adds (1 - z) S s to the state after the stretch, and -S s / n to the mean of the state.
-    Before the first stretch each column had settled at its value in ``settled``.
-    """
-
-    def __init__(
-        self,
-        bank: tuple[Complex, Complex],
-        direct: float,
-        period: float,
-        edges: Edges,
-        settled: Array,
-    ) -> None:
-        some = np.flatnonzero(bank[1])
-        order = some[np.argsort(bank[0][some].imag == 0.0, kind="stable")]
-        poles, weights = (each[order] for each in bank)
-        lengths, self._which = np.unique(np.diff(edges), return_inverse=True)
-        samples = lengths[:, np.newaxis]
-        mean = np.expm1(poles * period * samples) / (samples * np.expm1(poles * period))
-        sums = np.array([_of_slope(np.exp(poles * period), length) for length in lengths])
-        self._bank = _StretchBank(
-            np.exp(poles * period * samples),
-            mean * weights,
-            int(np.count_nonzero(poles.imag)),
-            direct + np.sum((1.0 - mean) * weights, axis=1).real,
-            -np.sum(sums * weights, axis=1).real / lengths,
-            -np.expm1(poles * period) * sums,
-        )
-        middles = np.pad(0.5 * (edges[1:] + edges[:-1]), 1, mode="edge")
-        self._shares = np.diff(edges) / np.maximum(middles[2:] - middles[:-2], 1.0)
-        self._first, self._before = 0, settled
-        self._states = np.zeros((2, len(poles), len(settled)))
-        self._states[0] = settled
-        self._live = settled != 0.0
-
-    def __call__(self, columns: Array, after: Array | None = None) -> Array:
-        """Means of the output for the next piece, both (stretches, columns).
-
-        ``after`` is the row that follows the piece, if any. A column that has been zero so far
-        costs nothing.
-        """
-        before = self._before if self._first else columns[0]
-        self._before = columns[-1]
-        part = slice(self._first, self._first + len(columns))
-        self._first = part.stop
-        self._live |= columns.any(axis=0)
-        if after is not None:
-            self._live |= after != 0.0
-        padded = np.vstack([before, columns, columns[-1] if after is None else after])
-        given = self._which[part], self._shares[part], self._bank
-        if self._live.all():
-            return _filtered(padded, *given, *self._states)
-        result, states = np.zeros(columns.shape), np.compress(self._live, self._states, axis=2)
-        some = np.compress(self._live, padded, axis=1)
-        result[:, self._live] = _filtered(some, *given, *states)
-        self._states[:, :, self._live] = states
-        return result
-
-    def pulled(self, pull: Array) -> tuple[Array, float]:
-        """Derivatives of Σ_s pull_s y_s by the inputs of all stretches, and by the settled input.
-
-        y_s is the mean of the output over stretch s; ``pull`` and the first result have the shape
-        (stretches,).
-        """
-        return _pulled(pull, self._which, self._shares, self._bank)
-
-
-def _of_slope(z: Complex, samples: int) -> Complex:
-    """S of poles z, (poles,), in a stretch of so many samples."""
-    places = np.arange(samples)[:, np.newaxis]
-    line = (places - 0.5 * (samples - 1)) / samples
-    return np.asarray(np.sum(line * z ** (samples - 1 - places), axis=0))
-
-
-@compiled
-def _pulled(pull: Array, which: Edges, shares: Array, bank: _StretchBank) -> tuple[Array, float]:
-    z, of_states, _, of_input, of_slope, shifts = bank
-    result, later = np.zeros(pull.size), np.zeros(z.shape[1], np.complex128)
-    for s in range(pull.size - 1, -1, -1):
-        kind = which[s]
-        total, slope = of_input[kind] * pull[s], of_slope[kind] * pull[s]
-        for i in range(z.shape[1]):
-            total += ((1.0 - z[kind, i]) * later[i]).real
-            slope += (shifts[kind, i] * later[i]).real
-            later[i] = z[kind, i] * later[i] + of_states[kind, i] * pull[s]
-        result[s] += total
-        result[min(s + 1, pull.size - 1)] += shares[s] * slope
-        result[max(s - 1, 0)] -= shares[s] * slope
-    return result, later.real.sum()
-
-
-@compiled
-def _filtered(
-    padded: Array, which: Edges, shares: Array, bank: _StretchBank, real: Array, imag: Array
-) -> Array:
-    z, of_states, modes, of_input, of_slope, shifts = bank
-    stretches, many = padded.shape[0] - 2, padded.shape[1]
-    result, slope = np.empty((stretches, many)), np.empty(many)
-    for b in range(stretches):
-        kind = which[b]
-        for c in range(many):
-            slope[c] = shares[b] * (padded[b + 2, c] - padded[b, c])
-            result[b, c] = of_input[kind] * padded[b + 1, c] + of_slope[kind] * slope[c]
-        for i in range(modes):
-            tr, ti = of_states[kind, i].real, of_states[kind, i].imag
-            zr, zi = z[kind, i].real, z[kind, i].imag
-            sr, si = shifts[kind, i].real, shifts[kind, i].imag
-            for c in range(many):
-                v = padded[b + 1, c]
-                xr, xi = real[i, c], imag[i, c]
-                result[b, c] += tr * xr - ti * xi
-                xr -= v
-                real[i, c] = v + zr * xr - zi * xi + sr * slope[c]
-                imag[i, c] = zr * xi + zi * xr + si * slope[c]
-        for i in range(modes, z.shape[1]):
-            tr, zr, sr = of_states[kind, i].real, z[kind, i].real, shifts[kind, i].real
-            for c in range(many):
-                v, xr = padded[b + 1, c], real[i, c]
-                result[b, c] += tr * xr
-                real[i, c] = v + zr * (xr - v) + sr * slope[c]
-    return result

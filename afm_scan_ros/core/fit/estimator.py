@@ -21,8 +21,9 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.evidence import first_scales
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
-from afm_scan_ros.core.fit.sensitivity import Simulation, jacobian, pulled, simulate
+from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
 from afm_scan_ros.core.fit.signals import Signals, noise_of
+from afm_scan_ros.core.fit.simulation import Simulation, simulate
 from afm_scan_ros.core.fit.tones import find_tones, offered_tones
 from afm_scan_ros.core.types import Array
 
@@ -124,7 +125,7 @@ class AxisFit:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
         pairs = zip(self.records, self.simulated(theta), strict=True)
         for k, (record, simulation) in enumerate(pairs):
-            left = record.mean - self.gain * simulation.response.output[record.used]
+            left = record.mean - self.gain * simulation.output[record.used]
             left = record.gathered(left) if gathered else left
             yield left, self.free_of(k, gathered=gathered).without(left)
 
@@ -211,9 +212,8 @@ class AxisFit:
 
     def columns(self, k: int, *, with_operator: bool) -> Iterator[tuple[slice, Array]]:
         """Yield ∂y/∂θ of a record for a gain of 1, piece by piece: see ``jacobian``."""
-        simulation = self.simulated(self.theta)[k]
-        pieces = self._pieces_of(k) if with_operator else None
-        return jacobian(self.layout, self.theta, self.records[k], simulation, pieces)
+        pieces = self.pieces(k) if with_operator else None
+        return jacobian(self.simulated(self.theta)[k], pieces)
 
     def bent(self, move: Array, part: float, *, with_operator: bool) -> Array:
         """Right-hand side g for what the second derivative of the model adds to a move.
@@ -225,13 +225,13 @@ class AxisFit:
         right, here = np.zeros(self.layout.size), self.simulated(self.theta)
         with np.errstate(over="ignore", invalid="ignore"):
             for k, (record, *three) in enumerate(zip(self.records, *ends, here, strict=True)):
-                up, down, middle = (one.response.output[record.used] for one in three)
+                up, down, middle = (one.output[record.used] for one in three)
                 variance = self.variance(record)
                 added = self.gain * (2.0 * middle - up - down) / part**2
                 left = self.free_of(k, gathered=True).without(record.gathered(added))
-                pieces = self._pieces_of(k) if with_operator else None
+                pieces = self.pieces(k) if with_operator else None
                 pull = self.gain * left / variance
-                right += pulled(self.layout, self.theta, record, here[k], pieces, pull)
+                right += pulled(here[k], pieces, pull[:, np.newaxis])[:, 0]
         return _finite(right)
 
     def cover(self, most: float) -> float:
@@ -283,7 +283,7 @@ class AxisFit:
         lefts = self.residuals()
         for k, left in enumerate(lefts):
             record = self.records[k]
-            motion = self.gain * simulations[k].response.output[record.used]
+            motion = self.gain * simulations[k].output[record.used]
             given = left, motion, self.discrepancy, record.length
             self.records[k] = record.with_tones(find_tones(*given, settings), settings.tone_most)
         known = {tone for record in self.records for tone in record.tones}
@@ -333,7 +333,7 @@ class AxisFit:
             self._regressors[k] = key, {way: (one, one.T @ one) for way, one in both.items()}
         return Free(*self._regressors[k][1][gathered], self.variance(record))
 
-    def _pieces_of(self, k: int) -> Iterable[Columns]:
+    def pieces(self, k: int) -> Iterable[Columns]:
         """∂A/∂(operator) in a record; those of a linear operator are kept.
 
         They are made anew where what the record remembers has moved by half of what plays resolve.

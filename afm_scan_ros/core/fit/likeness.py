@@ -47,7 +47,7 @@ def refuse_unlike(fit: AxisFit) -> None:
     not. Raises InputError, which names the record.
     """
     simulations = fit.simulated(fit.theta)
-    lines = [fit.gain * one.response.output for one in simulations]
+    lines = [fit.gain * one.output for one in simulations]
     mode = min((omega for omega, *_ in fit.layout.of_modes(fit.theta)), default=np.inf)
     highest, settings = mode / (2.0 * np.pi), fit.layout.settings
     pairs = zip(fit.records, lines, strict=True)

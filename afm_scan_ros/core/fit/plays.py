@@ -302,10 +302,16 @@ class Plays:
 def _output(
     drive: Array, thresholds: Array, plays: Array, tables: Array, lower: float, scale: float
 ) -> Array:
+    """Sum of the tables at all plays, (n,).
+
+    Where neighbours lie no farther apart than their thresholds, as after any drive, a play that
+    stays shows that all of larger thresholds stay.
+    """
     result = np.empty(drive.size)
     last = tables.shape[1] - 2
     kept = np.zeros(plays.size)
     total = 0.0
+    nested = np.all(np.abs(np.diff(plays)) <= np.diff(thresholds) * (1.0 + 1e-12))
     for k in range(drive.size):
         u = drive[k]
         for i in range(plays.size):
@@ -317,6 +323,8 @@ def _output(
                 value = tables[i, cell] + (place - cell) * (tables[i, cell + 1] - tables[i, cell])
                 total += value - kept[i]
                 kept[i] = value
+            elif nested:
+                break
         result[k] = total
     return result
 

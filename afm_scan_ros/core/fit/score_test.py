@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.parameters import Mode
-from afm_scan_ros.core.fit.sensitivity import of_vibration
+from afm_scan_ros.core.fit.parameters import Columns, Mode
+from afm_scan_ros.core.fit.sensitivity import pulled
 from afm_scan_ros.core.types import Array
 
 Place: TypeAlias = tuple[float, float]
@@ -43,27 +43,11 @@ class ScoreTest:
         self.fit, self.free = fit, np.flatnonzero(free)
         self.with_operator = bool(free[: fit.layout.parts["map"].stop].any())
         self._left = fit.gathered()
-        self._columns = [
-            [
-                (rows, one[:, self.free].astype(np.float32))
-                for rows, one in fit.columns(k, with_operator=self.with_operator)
-            ]
-            for k in range(len(fit.records))
+        self._pieces: list[list[Columns] | None] = [
+            list(fit.pieces(k)) if self.with_operator else None for k in range(len(fit.records))
         ]
-        self._matrix, self._right = np.zeros((len(self.free),) * 2), np.zeros(len(self.free))
-        for k, left in enumerate(self._left):
-            matrix, right = fit.products(k, left, self._pieces(k))
-            self._matrix += matrix
-            self._right += right
-
-    def _pieces(self, k: int) -> Iterator[tuple[slice, Array]]:
-        """Derivatives of a record by what is free, in double precision again.
-
-        All products are of the same rounded derivatives, for what a mode explains beyond all that
-        imitates it is a small difference.
-        """
-        for rows, one in self._columns[k]:
-            yield rows, one.astype(float)
+        matrix, right = fit.normal(with_operator=self.with_operator)
+        self._matrix, self._right = matrix[np.ix_(self.free, self.free)], right[self.free]
 
     def of(self, places: Sequence[Place]) -> Iterator[FoundMode]:
         """Yield what each mode explains; so many are tried at a time as memory holds."""
@@ -106,15 +90,15 @@ class ScoreTest:
         """H_κκ, H_θκ and b_κ of the weights at some places of a wider θ."""
         fit, at = self.fit, weights - wider.layout.parts["lags"].start
         own, shared = np.zeros((len(at), len(at))), np.zeros((len(self.free), len(at)))
-        pull, simulations = np.zeros(len(at)), wider.simulated(wider.theta)
-        for k, (record, simulation) in enumerate(zip(fit.records, simulations, strict=True)):
-            given = wider.layout, wider.theta, record, simulation
-            columns = of_vibration(*given)[record.stretches][:, at]
+        pull, here = np.zeros(len(at)), fit.simulated(fit.theta)
+        every = zip(fit.records, here, self._pieces, self._left, strict=True)
+        for k, (record, simulation, pieces, left) in enumerate(every):
+            with_modes = simulation.with_theta(wider.layout, wider.theta)
+            columns = with_modes.vibration[record.stretches][:, at]
             columns *= fit.gain * record.weights[:, np.newaxis]
             free, variance = fit.free_of(k, gathered=True), fit.variance(record)
             alone = free.without(columns) / variance
             own += columns.T @ alone
-            pull += columns.T @ self._left[k] / variance
-            for rows, one in self._pieces(k):
-                shared += fit.gain * (one.T @ alone[rows])
+            pull += columns.T @ left / variance
+            shared += fit.gain * pulled(simulation, pieces, alone)[self.free]
         return own, shared, pull

@@ -12,8 +12,9 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
-from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
+from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.uncertainty import information, inverse
 from afm_scan_ros.core.model import (
     BaseEffects,
@@ -86,11 +87,11 @@ class Knowledge:
         simulation = simulate(layout, fit.theta, record)
         theta = layout.of_operator(fit.theta)
         pieces = layout.operator.pieces(theta, drive, edges, layout.memory_of(fit.theta, record))
-        rows = [one for _, one in jacobian(layout, fit.theta, record, simulation, pieces)]
+        rows = [one for _, one in jacobian(simulation, pieces)]
         change = np.concatenate(rows)
         change -= change.mean(axis=0)
         variance = np.einsum("ij,jk,ik->", change, self.posterior, change, optimize=True)
-        moved = simulation.response.output[record.used]
+        moved = simulation.output[record.used]
         error = variance / len(moved) + fit.discrepancy**2 * np.var(moved)
         return float(np.sqrt(error) / np.ptp(moved))
 

@@ -13,8 +13,9 @@ from scipy.signal import welch
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.sensitivity import jacobian, simulate
+from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals, correlation_length
+from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.types import Array
 
 
@@ -81,13 +82,13 @@ def predicted(fit: AxisFit, drive: Array, period: float) -> PredictedMotion:
     given, edges = ("prediction", drive, np.zeros(count), period, 1, 0), np.arange(count + 1)
     record = Signals(*given, rested=True, noise=0.0, edges=edges)
     simulation = simulate(fit.layout, fit.theta, record)
-    moved = fit.gain * (simulation.response.output - simulation.response.output[0])
+    moved = fit.gain * (simulation.output - simulation.output[0])
     theta = fit.layout.of_operator(fit.theta)
     pieces = operator.pieces(theta, drive, edges, None)
     variance, rest = np.empty(count), None
     spread = partial(np.einsum, "ij,jk,ik->i", optimize=True)
     known = covariance(fit)
-    for rows, piece in jacobian(fit.layout, fit.theta, record, simulation, pieces):
+    for rows, piece in jacobian(simulation, pieces):
         rest = piece[0].copy() if rest is None else rest
         change = fit.gain * (piece - rest)
         variance[rows] = spread(change, known, change)

@@ -12,7 +12,7 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
-from afm_scan_ros.core.fit.sensitivity import simulate
+from afm_scan_ros.core.fit.simulation import simulate
 from helpers.fit_cases import (
     DAMPING,
     FREQUENCY,
@@ -80,7 +80,7 @@ def test_tables_stay_where_others_would_lose_what_a_step_gained() -> None:
     layout = layout_of(operator, 1.0, PERIOD, SETTINGS)
     theta = layout.start()
     theta[layout.parts["slopes"]] = rng.uniform(-0.8, 0.8, operator.unbent().size)
-    moved = GAIN * simulate(layout, theta, signals(drive, drive, 1)).response.output
+    moved = GAIN * simulate(layout, theta, signals(drive, drive, 1)).output
     fit = AxisFit(layout, [signals(drive, moved, 1)], GAIN, theta, 1e-5)
     before = fit.objective(theta)
     assert fit.cover(1.0) == 0.0

@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
-from afm_scan_ros.core.fit.sensitivity import simulate
+from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.fit.uncertainty import covariance, predicted
 from afm_scan_ros.core.scanner import forward
@@ -53,7 +53,7 @@ def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
     (simulation,) = fit.simulated(fit.theta)
     cascade = forward(model_of(fit), PERIOD)
     of_model = cascade.apply(cascade.at_rest(), drive)[1]
-    apart = of_model - GAIN * simulation.response.output
+    apart = of_model - GAIN * simulation.output
     assert np.abs(apart).max() < 1e-6 * np.ptp(of_model)
 
 
@@ -68,7 +68,7 @@ def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
     one, known = signals(fresh, fresh, 1), covariance(fit)
     rng, drawn = np.random.default_rng(6), []
     for theta in rng.multivariate_normal(fit.theta, known, 200):
-        response = simulate(fit.layout, theta, one).response.output
+        response = simulate(fit.layout, theta, one).output
         drawn.append(fit.gain * (response - response[0]))
     of_model = (fit.discrepancy * np.std(np.mean(drawn, axis=0))) ** 2
     stated = np.sqrt(np.maximum(stated**2 - of_model, 0.0))

@@ -11,7 +11,8 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Layout, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
-from afm_scan_ros.core.fit.sensitivity import jacobian, pulled, simulate
+from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
+from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.stretches import means
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
@@ -65,14 +66,14 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, sta
     one = evolve(one, rested=rested, unknown=unknown)
     memory = layout.memory_of(theta, one)
     pieces = operator.pieces(layout.of_operator(theta), drive, one.edges, memory)
-    of_pieces = jacobian(layout, theta, one, simulate(layout, theta, one), pieces)
+    of_pieces = jacobian(simulate(layout, theta, one), pieces)
     found = np.concatenate([piece for _, piece in of_pieces])
     known = layout.size - operator.unknowns
     remembered = np.arange(layout.parts["creep"].stop, layout.size)
     for place in [*rng.choice(known, 60, replace=False), *remembered]:
         step = 1e-5 * np.eye(layout.size)[place]
         up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
-        slope = (up.response.output - down.response.output)[one.used] / 2e-5
+        slope = (up.output - down.output)[one.used] / 2e-5
         motion = float(np.linalg.norm(slope)) + 1e-6
         close = 0.003 if block == 1 else 0.02 if kind == "one state" else 0.15
         assert np.linalg.norm(slope - found[:, place]) < close * motion + 5e-5, place
@@ -87,14 +88,14 @@ def test_residuals_are_pulled_back_by_the_same_jacobian(
     layout, theta, rng = at_some_theta(kind, order)
     one = evolve(signals(drive, 1e-6 * drive, block), rested=rested, unknown=unknown)
     one = evolve(one, edges=np.unique([*one.edges[::3], one.edges[-1]]))
-    at = layout, theta, one, simulate(layout, theta, one)
+    at = simulate(layout, theta, one)
     given = layout.of_operator(theta), drive, one.edges
     pieces = list(layout.operator.pieces(*given, layout.memory_of(theta, one)))
-    whole = np.concatenate([piece for _, piece in jacobian(*at, pieces)])
-    pull = rng.standard_normal(len(whole))
-    expected = pull @ whole
-    found = pulled(*at, pieces, pull)  # those of plays are of single precision
-    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+    whole = np.concatenate([piece for _, piece in jacobian(at, pieces)])
+    pull = rng.standard_normal((len(whole), 2))
+    expected = whole.T @ pull
+    found = pulled(at, pieces, pull)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11 * abs(expected).max())
 
 
 def test_misfit_falls_as_the_normal_equations_say() -> None:

@@ -1,0 +1,120 @@
+"""What the linear part of an axis makes of every sample of its input, exactly.
+
+Sums of states over a stretch of n samples follow from the states x at its ends and the inputs v:
+
+    (1 - z) Σ x = (1 - z) Σ v + x[0] - x[n]
+
+The same holds for the derivatives d by a pole, of which d[k + 1] = z (d[k] + T (x[k] - v[k])).
+"""
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.compiled import regrouped
+from afm_scan_ros.core.fit.dynamics import Complex, PoleBank, States
+from afm_scan_ros.core.fit.stretches import Edges, averaged
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Response:
+    """The response of an axis to inputs v (n,), and V's output alone, both in samples, (n,).
+
+    The axis had settled under the input ``settled`` (V). ``dynamics`` have the sensor within V.
+    """
+
+    dynamics: PoleBank
+    period: float
+    inputs: Array
+    settled: float
+    fast: Array
+    output: Array
+
+    def mean(self, block: int) -> Array:
+        """Means of the output over blocks, shape (blocks,)."""
+        return averaged(self.output, block)
+
+    def states(self, edges: Edges) -> States:
+        """Means over stretches of what the output's derivatives hold."""
+        of_modes, of_lags, of_creep = _decays(self.dynamics, self.period)
+        unread, given = np.zeros(len(self.inputs)), (self.settled, self.inputs, edges)
+        modes, changes = _of_modes(of_modes, self.dynamics.weights, self.period, *given, unread)
+        lags = _of_lags(of_lags, np.zeros(len(of_lags)), *given, unread)
+        begun = self.settled * float(self.dynamics.weights.real.sum())
+        late = _of_lags(of_creep, np.zeros(len(of_creep)), begun, self.fast, edges, unread)
+        return States(modes, changes, lags, late)
+
+
+def respond(dynamics: PoleBank, period: float, inputs: Array, settled: float) -> Response:
+    """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
+    dynamics = dynamics.read()
+    modes, lags, creep = _decays(dynamics, period)
+    fast, whole, count = np.zeros(len(inputs)), np.array([0, len(inputs)], np.intp), dynamics.modes
+    _of_modes(modes, dynamics.weights, period, settled, inputs, whole, fast)
+    _of_lags(lags, dynamics.weights[count:].real.copy(), settled, inputs, whole, fast)
+    output, begun = fast.copy(), settled * float(dynamics.weights.real.sum())
+    _of_lags(creep, dynamics.gains, begun, fast, whole, output)
+    return Response(dynamics, period, inputs, settled, fast, output)
+
+
+def _decays(dynamics: PoleBank, period: float) -> tuple[Complex, Array, Array]:
+    """Decay z of a sample, of modes, of lags and of creep."""
+    z, count = np.exp(dynamics.poles * period), dynamics.modes
+    return z[:count], z[count:].real.copy(), np.exp(-period / dynamics.time_constants)
+
+
+@regrouped
+def _of_modes(
+    z: Complex,
+    weights: Complex,
+    period: float,
+    settled: float,
+    inputs: Array,
+    edges: Edges,
+    output: Array,
+) -> tuple[Complex, Complex]:
+    """Add what modes make of inputs to an output; return means of x and d, (stretches, modes).
+
+    The first of the ``weights`` are those of the modes.
+    """
+    count, stretches = z.size, edges.size - 1
+    states = np.empty((stretches, count), np.complex128)
+    changes = np.empty((stretches, count), np.complex128)
+    for i in range(count):
+        decay, driven, share = z[i], 1.0 - z[i], weights[i]
+        x, d = settled + 0j, 0j
+        for s in range(stretches):
+            before, change, total = x, d, 0.0
+            for k in range(edges[s], edges[s + 1]):
+                output[k] += share.real * x.real - share.imag * x.imag
+                total += inputs[k]
+                d = decay * (d + period * (x - inputs[k]))
+                x = decay * x + driven * inputs[k]
+            length = edges[s + 1] - edges[s]
+            moved = (before - x) / driven
+            states[s, i] = (total + moved) / length
+            changes[s, i] = (change - d + decay * period * moved) / (driven * length)
+    return states, changes
+
+
+@regrouped
+def _of_lags(
+    z: Array, gains: Array, settled: float, inputs: Array, edges: Edges, output: Array
+) -> Array:
+    """Add what lags make of inputs to an output; return means of x, (stretches, lags)."""
+    count, stretches, driven = z.size, edges.size - 1, 1.0 - z
+    states, x = np.empty((stretches, count)), np.full(count, settled)
+    for s in range(stretches):
+        length, driving = edges[s + 1] - edges[s], 0.0
+        for j in range(count):
+            states[s, j] = x[j]
+        for k in range(edges[s], edges[s + 1]):
+            v, total = inputs[k], 0.0
+            driving += v
+            for j in range(count):
+                total += gains[j] * x[j]
+                x[j] = z[j] * x[j] + driven[j] * v
+            output[k] += total
+        for j in range(count):
+            states[s, j] = (driving + (states[s, j] - x[j]) / driven[j]) / length
+    return states

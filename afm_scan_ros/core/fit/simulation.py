@@ -1,0 +1,139 @@
+"""A record as a model would have moved in it, and what its derivatives are made of."""
+
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+
+from afm_scan_ros.core.effects.hysteresis.preisach import terms
+from afm_scan_ros.core.fit.dynamics import PoleBank, States
+from afm_scan_ros.core.fit.parameters import Layout
+from afm_scan_ros.core.fit.response import Response, respond
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.stretch_filter import StretchFilter
+from afm_scan_ros.core.fit.stretches import means
+from afm_scan_ros.core.types import Array
+
+
+@frozen(eq=False)
+class Simulation:
+    """A record at θ: effective input F (V), (n,), and the response for a gain of 1.
+
+    The scanner had settled under the input ``settled`` (V). ``output`` are means of the response
+    over blocks, (blocks,).
+    """
+
+    layout: Layout
+    theta: Array
+    record: Signals
+    effective: Array
+    settled: float
+    dynamics: PoleBank
+    response: Response
+    output: Array
+
+    def with_theta(self, layout: Layout, theta: Array) -> "Simulation":
+        """Simulate the same record under the same effective input."""
+        return _responded(layout, theta, self.record, self.effective, self.settled)
+
+    @cached_property
+    def states(self) -> States:
+        """What the derivatives of the response hold."""
+        return self.response.states(self.record.edges)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """dA/dF averaged over stretches, (stretches,)."""
+        effective, mapped = means(self.effective, self.record.edges), self.layout.map_of(self.theta)
+        return np.ones_like(effective) if mapped is None else mapped.slope(effective)
+
+    @cached_property
+    def bends(self) -> Array:
+        """Means of the map's terms q_j(F) over stretches, (stretches, terms)."""
+        operator = self.layout.operator
+        every = terms(self.effective, operator.lower, operator.upper, operator.bends)
+        return means(every, self.record.edges)
+
+    @cached_property
+    def remembered(self) -> Array:
+        """∂A/∂memory averaged over stretches, (stretches, unknowns); none for a known start."""
+        layout, record = self.layout, self.record
+        memory = layout.memory_of(self.theta, record)
+        if record.unknown is None or memory is None:
+            return np.zeros((len(record.edges) - 1, 0))
+        given = layout.of_operator(self.theta), record.drive, record.edges, memory
+        return layout.operator.remembered(*given)
+
+    @cached_property
+    def vibration(self) -> Array:
+        """Derivatives of all stretches by the weights of the lags, and by what θ has of modes."""
+        dynamics = self.dynamics
+        modes, changes, lags = dynamics.seen(self.states)
+        columns, settled = [lags], [np.full(lags.shape[1], self.settled)]
+        for i, (omega, damping, *_) in enumerate(self.layout.of_modes(self.theta)):
+            state, change = modes[:, i], dynamics.weights[i] * changes[:, i]
+            pole = dynamics.poles[i]
+            turned = omega * damping * (1.0 + 1j * damping / np.sqrt(1.0 - damping**2))
+            moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]
+            columns.append(np.column_stack(moved))
+            settled.append(np.array([0.0, 0.0, self.settled, 0.0]))
+        slow = (-1.0 / self.layout.time_constants).astype(np.complex128)
+        bank = slow, dynamics.gains.astype(np.complex128)
+        given = self.record.period, self.record.edges, np.concatenate(settled)
+        return StretchFilter(bank, 1.0, *given)(np.hstack(columns))
+
+    @cached_property
+    def corner(self) -> Array:
+        """Derivative by the logarithm of the sensor's corner, (stretches, 1), by a difference.
+
+        There is no column without a sensor.
+        """
+        layout, edges = self.layout, self.record.edges
+        part, apart = layout.parts["sensor"], float(np.cbrt(np.finfo(float).eps))
+        if not layout.sensor_order:
+            return np.zeros((len(edges) - 1, 0))
+        step = np.zeros(layout.size)
+        step[part] = apart
+        given = self.record.period, self.effective, self.settled
+        ends = [layout.dynamics(self.theta + way * step) for way in (1.0, -1.0)]
+        up, down = (means(respond(one, *given).output, edges) for one in ends)
+        return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))
+
+
+def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
+    """Simulate a record exactly; raises InputError where the map behind the operator turns back."""
+    operator, mapped = layout.of_operator(theta), layout.map_of(theta)
+    before = np.zeros(1) if record.rested else record.drive[:1]
+    memory = layout.memory_of(theta, record)
+    raw, rest = (layout.operator.output(operator, one, memory) for one in (record.drive, before))
+    if mapped is not None:
+        raw, rest = mapped.output(raw), mapped.output(rest)
+    return _responded(layout, theta, record, raw, float(rest[0]))
+
+
+def _responded(
+    layout: Layout, theta: Array, record: Signals, effective: Array, settled: float
+) -> Simulation:
+    dynamics = layout.dynamics(theta)
+    response = respond(dynamics, record.period, effective, settled)
+    given = effective, settled, dynamics, response, response.mean(record.block)
+    return Simulation(layout, theta, record, *given)
+
+
+def at_rest(layout: Layout, theta: Array) -> Array:
+    """F (V) at depolarised rest, shape (1,)."""
+    mapped, at = (
+        layout.map_of(theta),
+        layout.operator.output(layout.of_operator(theta), np.zeros(1), None),
+    )
+    return at if mapped is None else mapped.output(at)
+
+
+def by_rest(layout: Layout, theta: Array) -> Array:
+    """Derivatives of F at depolarised rest by the operator and its map."""
+    operator, given, rest = layout.operator, layout.of_operator(theta), np.zeros(1)
+    mapped, at = layout.map_of(theta), at_rest(layout, theta)
+    (columns,) = operator.pieces(given, rest, np.arange(2), None)
+    bends = terms(at, operator.lower, operator.upper, operator.bends)
+    slope = 1.0 if mapped is None else mapped.slope(at)[0]
+    return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
