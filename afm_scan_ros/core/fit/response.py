@@ -80,20 +80,30 @@ def _of_modes(
     count, stretches = z.size, edges.size - 1
     states = np.empty((stretches, count), np.complex128)
     changes = np.empty((stretches, count), np.complex128)
-    for i in range(count):
-        decay, driven, share = z[i], 1.0 - z[i], weights[i]
-        x, d = settled + 0j, 0j
-        for s in range(stretches):
-            before, change, total = x, d, 0.0
-            for k in range(edges[s], edges[s + 1]):
-                output[k] += share.real * x.real - share.imag * x.imag
-                total += inputs[k]
-                d = decay * (d + period * (x - inputs[k]))
-                x = decay * x + driven * inputs[k]
-            length = edges[s + 1] - edges[s]
-            moved = (before - x) / driven
-            states[s, i] = (total + moved) / length
-            changes[s, i] = (change - d + decay * period * moved) / (driven * length)
+    real, imag = z.real.copy(), z.imag.copy()
+    shares, turned = weights.real.copy(), weights.imag.copy()
+    x, y = np.full(count, settled), np.zeros(count)
+    d, e = np.zeros(count), np.zeros(count)
+    for s in range(stretches):
+        length, driving = edges[s + 1] - edges[s], 0.0
+        for i in range(count):
+            states[s, i] = complex(x[i], y[i])
+            changes[s, i] = complex(d[i], e[i])
+        for k in range(edges[s], edges[s + 1]):
+            v, total = inputs[k], 0.0
+            driving += v
+            for i in range(count):
+                total += shares[i] * x[i] - turned[i] * y[i]
+                a, b = x[i] - v, y[i]
+                p, q = d[i] + period * a, e[i] + period * b
+                d[i], e[i] = real[i] * p - imag[i] * q, real[i] * q + imag[i] * p
+                x[i], y[i] = v + real[i] * a - imag[i] * b, real[i] * b + imag[i] * a
+            output[k] += total
+        for i in range(count):
+            moved = (states[s, i] - complex(x[i], y[i])) / (1.0 - z[i])
+            change = changes[s, i] - complex(d[i], e[i]) + z[i] * period * moved
+            states[s, i] = (driving + moved) / length
+            changes[s, i] = change / (1.0 - z[i]) / length
     return states, changes
 
 
