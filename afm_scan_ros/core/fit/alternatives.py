@@ -1,6 +1,6 @@
 """Fits that compete with that by plays: by another operator, another sensor, another start."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import partial
 from typing import TypeAlias
@@ -32,9 +32,9 @@ def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     rest. Nothing else is tried where hardly more than the sensor's noise is left.
     """
     fit = _with_any_sensor(fit, progress)
-    resting = _with_rest(fit, progress)
+    resting = with_rest(fit, progress)
     if resting is not fit:
-        fit = _with_any_sensor(counted_from_rest(resting), progress)
+        fit = _with_any_sensor(resting, progress)
     if fit.sufficient:
         progress("hardly more than noise is left")
         return fit
@@ -47,35 +47,37 @@ def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     return _with_any_sensor(other, progress)
 
 
-def _with_rest(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = ()) -> AxisFit:
     """Return a fit in which records began at rest where that has clearly the greater evidence.
 
-    All of unknown start are tried at once, and where these clearly did not all rest, those one by
-    one whose memory is estimated.
+    Steps to it are of some ``groups`` of parameters, or of all. All records of unknown start are
+    tried at once, and where these clearly did not all rest, those one by one whose memory is
+    estimated.
     """
     unknown = [k for k, record in enumerate(fit.records) if not record.rested]
     estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
     if fit.at_noise or not unknown:
         return fit
     name = "rest before all records"
-    resting, lead = _compared(fit, partial(begun_at_rest, fit, unknown), progress, name)
+    resting, lead = _compared(fit, partial(begun_at_rest, fit, unknown), progress, name, groups)
     clear = fit.layout.settings.mode_chance
     if lead > clear:
-        return resting
+        return counted_from_rest(resting)
     for k in estimated if len(unknown) > 1 and lead < -clear else []:
         name = f"rest before {fit.records[k].name}"
-        fit = _preferred(fit, partial(begun_at_rest, fit, [k]), progress, name)
-    return fit
+        fit = _preferred(fit, partial(begun_at_rest, fit, [k]), progress, name, groups)
+    return counted_from_rest(fit)
 
 
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one with a low-pass of the sensor that has clearly the greater evidence.
 
     A steeper one is tried where the last was better, and not enough. None is where only noise is
-    left: what a low-pass leaves of slow records is slight, and large at other rates.
+    left, or hardly more of records that show a mode: what a low-pass leaves of slower records is
+    slight, and large at other rates.
     """
     for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
-        if fit.at_noise:
+        if fit.at_noise or (fit.sufficient and fit.layout.modes > 0):
             break
         before, name = fit, f"a sensor's low-pass of order {order}"
         fit = _preferred(fit, partial(with_sensor, fit, order), progress, name)
@@ -84,16 +86,26 @@ def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     return fit
 
 
-def _preferred(fit: AxisFit, changed: Changed, progress: ProgressCallback, name: str) -> AxisFit:
+def _preferred(
+    fit: AxisFit,
+    changed: Changed,
+    progress: ProgressCallback,
+    name: str,
+    groups: Sequence[str] = (),
+) -> AxisFit:
     """Return a fit, or a changed one whose evidence leads by as much as a mode has to explain."""
-    other, lead = _compared(fit, changed, progress, name)
+    other, lead = _compared(fit, changed, progress, name, groups)
     return other if lead > fit.layout.settings.mode_chance else fit
 
 
 def _compared(
-    fit: AxisFit, changed: Changed, progress: ProgressCallback, name: str
+    fit: AxisFit,
+    changed: Changed,
+    progress: ProgressCallback,
+    name: str,
+    groups: Sequence[str] = (),
 ) -> tuple[AxisFit, float]:
-    """Return a changed fit and by how much its evidence leads (nat).
+    """Return a changed fit and by how much its evidence leads (nat), after steps of some groups.
 
     The evidence is that of independent residuals, so the lead is divided by their correlation
     length. A fit that diverges is none of the scanner's, and none leads where there is none.
@@ -102,9 +114,9 @@ def _compared(
         other = changed()
         if other is None:
             return fit, -np.inf
-        lead = _lead(fit, other)
+        lead = _lead(fit, other, groups)
         if lead > 0.0:
-            settle(other, other.layout.settings.most_steps, searching=True)
+            settle(other, other.layout.settings.most_steps, groups, searching=True)
             lead = other.evidence() - fit.evidence()
     except ScanError as error:
         progress(f"{name}: {error}")
@@ -119,7 +131,7 @@ def _longest_correlation(fit: AxisFit) -> float:
     return max(map(correlation_length, fit.residuals()))
 
 
-def _lead(fit: AxisFit, other: AxisFit) -> float:
+def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str]) -> float:
     """By how much (nat) another fit has the greater evidence.
 
     Both take steps in turn until they converge or stall, or what may remain of the objective of
@@ -128,7 +140,7 @@ def _lead(fit: AxisFit, other: AxisFit) -> float:
     settings, lead = fit.layout.settings, 0.0
     for _ in range(settings.most_steps // settings.stage_steps):
         for each in (fit, other):
-            settle(each, settings.stage_steps, searching=True)
+            settle(each, settings.stage_steps, groups, searching=True)
         lead = other.evidence() - fit.evidence()
         beyond = lead - settings.mode_chance * _longest_correlation(other)
         remaining = fit.remaining if beyond > 0.0 else other.remaining
@@ -158,12 +170,22 @@ def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
     other.theta[laid.parts["lags"].start] = 1.0 - sum(mode[2] for mode in laid.of_modes(fit.theta))
     other.theta[laid.parts["sensor"]] = np.log(corner)
     other.weigh()
-    settle(other, settings.most_steps, LINEAR)
+    for _ in range(settings.most_steps // settings.stage_steps):
+        settle(other, settings.stage_steps, LINEAR)
+        left = _least_left(other) / fit.discrepancy**2
+        hopeless = laid.modes > 0 and left > 1.0 - settings.mode_share
+        if hopeless or other.converged or other.stalled:
+            break
     if laid.modes == 0:
         every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
-        other = min([other, *every], key=lambda each: each.discrepancy)
-    left = (other.discrepancy / fit.discrepancy) ** 2
-    return other if left < 1.0 - settings.mode_share else None
+        other = min([other, *every], key=_least_left)
+    return other if _least_left(other) / fit.discrepancy**2 < 1.0 - settings.mode_share else None
+
+
+def _least_left(fit: AxisFit) -> float:
+    """η² of a fit once it has converged, at least: what may remain counts ``decided``-fold."""
+    remaining = 0.0 if fit.converged else fit.layout.settings.decided * fit.remaining
+    return fit.discrepancy**2 * max(0.0, 1.0 - remaining / fit.misfit(fit.theta))
 
 
 def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:

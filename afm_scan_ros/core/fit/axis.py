@@ -6,7 +6,7 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.alternatives import better
+from afm_scan_ros.core.fit.alternatives import better, with_rest
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
@@ -64,8 +64,7 @@ def fit_axis(
         settle(fit, settings.most_steps, VIBRATION)
     refuse_unlike(fit)
     progress("fitting the hysteresis by plays")
-    _fit_plays(fit)
-    fit = better(fit, progress)
+    fit = better(_of_plays(fit, progress), progress)
     while True:
         settle(fit, settings.most_steps, searching=True)
         if fit.find_tones():
@@ -83,8 +82,11 @@ def fit_axis(
     return fit
 
 
-def _fit_plays(fit: AxisFit) -> None:
-    """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last."""
+def _of_plays(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last.
+
+    Whether records began at rest is asked before, for a start that is wrong hides all else.
+    """
     settings = fit.layout.settings
     by_plays = (*fit.layout.operator.parts, *LINEAR, "memory")
     settle(fit, settings.stage_steps, by_plays)
@@ -92,8 +94,12 @@ def _fit_plays(fit: AxisFit) -> None:
     while add_mode(fit):
         settle(fit, settings.stage_steps, by_plays)
         fit.find_tones()
+    fit = with_rest(fit, progress, by_plays)
     settle(fit, settings.stage_steps)
     fit.find_tones()
+    settle(fit, settings.stage_steps, searching=True)
+    fit.find_tones()
+    return fit
 
 
 def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:

@@ -17,8 +17,8 @@ from afm_scan_ros.core.fit.settings import FitSettings
 
 EQUAL, HALF_OR_TWICE, NEAR = (1.0,), (0.5, 1.0, 2.0), (0.7, 0.85, 1.0, 1.2, 1.4)
 """Dampings over that of the best mode so far: of the first climb, of the second, and at the end."""
-Spectrum = tuple[NDArray[np.floating], NDArray[np.floating]]
-"""Angular frequencies (rad/s) and power over that of noise, both (n,)."""
+Spectrum = tuple[NDArray[np.floating], NDArray[np.floating], float]
+"""Angular frequencies (rad/s) and power (nat), both (n,), and the power of the sensor's noise."""
 
 
 def add_first_mode(fit: AxisFit) -> FoundMode | None:
@@ -84,7 +84,7 @@ def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
 def _seen(found: FoundMode, spectra: Sequence[Spectrum], settings: FitSettings) -> bool:
     if np.hypot(*found.mode[2:]) > settings.heaviest_mode:
         return False
-    misfit, lines, _ = _left_about(spectra, found.mode[0], settings.mode_band)
+    misfit, lines, *_ = _left_about(spectra, found.mode[0], settings.mode_band)
     share = min(found.chance / misfit, 1.0 - settings.tone_chance)
     certain = -lines * np.log1p(-share) > settings.mode_chance
     return bool(certain and share > settings.mode_share)
@@ -102,15 +102,17 @@ def _summits(
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
     if not peaks:
         return
-    test = ScoreTest(fit, free)
-    for start in sorted(test.of(peaks), key=_chance, reverse=True)[:most]:
-        found = start
-        if found.chance < settings.near_chance * enough:
+    test, found = ScoreTest(fit, free), 0
+    starts = sorted(test.of(peaks), key=_chance, reverse=True)
+    for start in starts[: settings.tried_modes]:
+        summit = start
+        if found == most or summit.chance < settings.near_chance * enough:
             return
         for dampings in (EQUAL, HALF_OR_TWICE):
-            found = _climbed(test, found, dampings)
-        if found.mode[1] < settings.greatest_damping and found.chance >= enough:
-            yield max(found, *test.of(_about(found, 0.5, NEAR)), key=_chance)
+            summit = _climbed(test, summit, dampings)
+        if summit.mode[1] < settings.greatest_damping and summit.chance >= enough:
+            found += 1
+            yield max(summit, *test.of(_about(summit, 0.5, NEAR)), key=_chance)
 
 
 def _climbed(test: ScoreTest, found: FoundMode, dampings: Sequence[float]) -> FoundMode:
@@ -134,18 +136,19 @@ def _about(found: FoundMode, width: float, dampings: Sequence[float]) -> list[Pl
 def _peaks(fit: AxisFit, width: float, enough: float) -> list[float]:
     """Angular frequencies (rad/s) about which more is left than beside them, the most first.
 
-    Each is that of a band of a ``width``, in which the power of what is left exceeds that of noise
-    by a part of ``enough`` (nat) at least.
+    Each is that of a band of a ``width``, in which the power of what is left exceeds that of the
+    sensor's noise by a part of ``enough`` (nat) at least. The discrepancy η is not subtracted: a
+    mode is to explain it, and it is not white.
     """
     settings, (lowest, highest) = fit.layout.settings, _band(fit)
     count = int(np.log(highest / lowest) / width) if highest > lowest else 0
     grid = np.geomspace(lowest, highest, 2 * count + 1)
     spectra = _spectra(fit)
     left = np.array([_left_about(spectra, omega, 0.5 * width) for omega in grid])
-    misfit, _, bins = np.pad(left, ((1, 1), (0, 0))).T
+    misfit, _, bins, noise = np.pad(left, ((1, 1), (0, 0))).T
     density = misfit / np.maximum(bins, 1.0)
     peaks = np.flatnonzero((density[1:-1] >= density[:-2]) & (density[1:-1] >= density[2:]))
-    excess = (misfit - bins)[1:-1]
+    excess = (misfit - noise)[1:-1]
     some = [k for k in peaks if excess[k] > settings.near_chance * enough]
     return [float(grid[k]) for k in sorted(some, key=lambda k: -excess[k])[: settings.most_peaks]]
 
@@ -166,29 +169,30 @@ def _band(fit: AxisFit) -> tuple[float, float]:
 
 
 def _spectra(fit: AxisFit) -> list[Spectrum]:
-    """Spectra of what is left of each record, over what noise leaves in a bin."""
+    """Spectra of what is left of each record, over what its variance v_k leaves in a bin."""
     found: list[Spectrum] = []
     for record, left in zip(fit.records, fit.residuals(), strict=True):
         at = 2.0 * np.pi * np.fft.rfftfreq(len(left), record.length)
         window = np.hanning(len(left))
-        noise = float(window @ window) * fit.variance(record)
-        found.append((at, np.abs(np.fft.rfft(window * left)) ** 2 / noise))
+        variance = fit.variance(record)
+        power = np.abs(np.fft.rfft(window * left)) ** 2 / (float(window @ window) * variance)
+        found.append((at, power, record.noise**2 / record.block / variance))
     return found
 
 
 def _left_about(
     spectra: Iterable[Spectrum], omega: float, width: float
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """What is left (nat) within a band about an angular frequency (rad/s), and of how many lines.
 
     The band is of a ``width`` to either side, over its frequency. A line counts by its share of the
-    power, as the sharp ones of a periodic drive do not tell more than they are. The last is the
-    number of bins, which is what noise leaves.
+    power, as the sharp ones of a periodic drive do not tell more than they are. Then follow the
+    number of bins, and what noise leaves of them (nat).
     """
-    misfit, lines, bins = 0.0, 0.0, 0.0
-    for at, power in spectra:
+    misfit, lines, bins, noise = 0.0, 0.0, 0.0, 0.0
+    for at, power, each in spectra:
         ends = omega * (1.0 - width), omega * (1.0 + width)
         part = power[slice(*np.searchsorted(at, ends))]
-        misfit, bins = misfit + float(part.sum()), bins + len(part)
+        misfit, bins, noise = misfit + float(part.sum()), bins + len(part), noise + each * len(part)
         lines += float(part.sum() ** 2 / (part**2).sum()) if part.any() else 0.0
-    return misfit, lines, bins
+    return misfit, lines, bins, noise

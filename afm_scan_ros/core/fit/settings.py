@@ -252,8 +252,10 @@ class FitSettings:
     tried_modes: int = setting(
         4,
         "1",
-        "modes that are fitted in turn beside a sensor's low-pass, of which the best stays",
-        "the low-pass begins far from its corner, so what is left tells little of a resonance",
+        "peaks of what is left from which on a mode is sought, and modes that are fitted in turn"
+        " beside a sensor's low-pass, of which the best stays",
+        "the best peak may be a bend, and tells little of a resonance beside a low-pass that begins"
+        " far from its corner",
     )
     mode_values: int = setting(
         10_000_000,
