@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import layout_of
@@ -58,14 +59,22 @@ def add(fit: AxisFit, found: FoundMode) -> None:
 def first_mode(fit: AxisFit) -> FoundMode | None:
     """Return the mode that explains most of what a straight line leaves, None where it is little.
 
-    Then the residuals are about a resonance rather than of the loops of the hysteresis. The static
-    gain is free beside it, for a straight line through such a motion has another.
+    Where it explains a good part of what is left of a record, that is about a resonance rather than
+    of the loops of the hysteresis. The static gain is free beside it, for a straight line through
+    such a motion has another.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in ("lags", "creep"):
         free[fit.layout.parts[name]] = True
-    enough = fit.layout.settings.dominant_share * fit.misfit(fit.theta)
-    return next(iter(_summits(fit, free, enough, 1)), None)
+    every = _summits(fit, free, _dominant(fit), 1)
+    return next((one for one in every if _resounds(one, fit)), None)
+
+
+def _dominant(fit: AxisFit) -> float:
+    """What a mode explains at least (nat) that is more of a record than its hysteresis."""
+    lefts = zip(fit.records, fit.residuals(), strict=True)
+    each = [float(left @ left) / fit.variance(record) for record, left in lefts]
+    return 0.5 * fit.layout.settings.dominant_share * max(each)
 
 
 def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
@@ -78,7 +87,26 @@ def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
     settings, spectra = fit.layout.settings, _spectra(fit)
     free = fit.theta > fit.layout.lowest()
     every = _summits(fit, free, settings.mode_chance, most)
-    return [one for one in every if _seen(one, spectra, settings)]
+    return [one for one in every if _seen(one, spectra, settings) and _resounds(one, fit)]
+
+
+def _resounds(found: FoundMode, fit: AxisFit) -> bool:
+    """Whether some of what a mode explains is about its own frequency, above noise.
+
+    One far above all that moves only bends the response of the others, as a delay would.
+
+    The spectra are means over parts of each record, as a sweep passes the mode in one of them.
+    """
+    settings, left = fit.layout.settings, 0.0
+    ends = found.mode[0] * np.array([1.0 - settings.mode_band, 1.0 + settings.mode_band])
+    for record, residual in zip(fit.records, fit.residuals(), strict=True):
+        parts = len(residual) // settings.residual_segments
+        at, density = welch(residual, 1.0 / record.length, nperseg=parts)
+        first, last = np.searchsorted(2.0 * np.pi * at, ends)
+        band = density[max(first - 1, 0) : last + 1] * 0.5 / record.length
+        above = float(np.sum(band - record.noise**2 / record.block)) / fit.variance(record)
+        left += max(above, 0.0) * settings.residual_segments
+    return left > settings.own_share * found.chance
 
 
 def _seen(found: FoundMode, spectra: Sequence[Spectrum], settings: FitSettings) -> bool:
@@ -95,7 +123,8 @@ def _summits(
 ) -> Iterator[FoundMode]:
     """Try peaks of what is left, and climb from the best ones to their summits.
 
-    What is explained best by the greatest damping is a bend of the response, and no mode.
+    What is explained best by the greatest damping is a bend of the response and no mode, unless it
+    is more of a record than its hysteresis.
     """
     settings = fit.layout.settings
     width = 2.0 * settings.tried_damping
@@ -110,9 +139,12 @@ def _summits(
             return
         for dampings in (EQUAL, HALF_OR_TWICE):
             summit = _climbed(test, summit, dampings)
-        if summit.mode[1] < settings.greatest_damping and summit.chance >= enough:
+        bend = summit.mode[1] >= settings.greatest_damping
+        summit = max(summit, *test.of(_about(summit, 0.5, NEAR)), key=_chance)
+        bend &= summit.mode[1] >= settings.greatest_damping or summit.chance < _dominant(fit)
+        if summit.chance >= enough and not bend:
             found += 1
-            yield max(summit, *test.of(_about(summit, 0.5, NEAR)), key=_chance)
+            yield summit
 
 
 def _climbed(test: ScoreTest, found: FoundMode, dampings: Sequence[float]) -> FoundMode:

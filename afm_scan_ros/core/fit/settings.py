@@ -275,11 +275,17 @@ class FitSettings:
         "least share of the residuals in its band that a mode explains beside a smooth response",
         "seen on scanners made for tests: no derivation",
     )
-    dominant_share: float = setting(
-        0.5,
+    own_share: float = setting(
+        0.01,
         "1",
-        "share from which a mode precedes the hysteresis",
-        "it then hides the loops",
+        "least share of what a mode explains that is about its own frequency, above noise",
+        "resonances have 0.1 and more, as force far below a mode tells of it too",
+    )
+    dominant_share: float = setting(
+        0.25,
+        "1",
+        "share of what is left of a record from which a mode precedes the hysteresis",
+        "it then hides the loops; beyond its own band a straight line leaves as much",
     )
     most_modes: int = setting(
         4,
