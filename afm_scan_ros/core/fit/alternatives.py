@@ -28,13 +28,14 @@ Changed: TypeAlias = Callable[[], AxisFit | None]
 def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return the fit by plays, the paper's operator, or by what has clearly the greater evidence.
 
-    That is an operator of one state, a sensor with a low-pass of its own, or both, and a start at
-    rest. Nothing else is tried where hardly more than the sensor's noise is left.
+    That is an operator of one state, a sensor with a low-pass of its own, or both. Behind a
+    low-pass records may show anew that they began at rest. Nothing else is tried where hardly more
+    than the sensor's noise is left.
     """
-    fit = _with_any_sensor(fit, progress)
-    resting = with_rest(fit, progress)
-    if resting is not fit:
-        fit = _with_any_sensor(resting, progress)
+    sensed = _with_any_sensor(fit, progress)
+    if sensed is not fit:
+        resting = with_rest(sensed, progress)
+        fit = sensed if resting is sensed else _with_any_sensor(resting, progress)
     if fit.sufficient:
         progress("hardly more than noise is left")
         return fit
@@ -58,7 +59,7 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
     estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
     if fit.at_noise or not unknown:
         return fit
-    name = "rest before all records"
+    before, name = fit, "rest before all records"
     resting, lead = _compared(fit, partial(begun_at_rest, fit, unknown), progress, name, groups)
     clear = fit.layout.settings.mode_chance
     if lead > clear:
@@ -66,7 +67,7 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
     for k in estimated if len(unknown) > 1 and lead < -clear else []:
         name = f"rest before {fit.records[k].name}"
         fit = _preferred(fit, partial(begun_at_rest, fit, [k]), progress, name, groups)
-    return counted_from_rest(fit)
+    return fit if fit is before else counted_from_rest(fit)
 
 
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
