@@ -117,6 +117,43 @@ def test_no_mode_explains_more_than_is_left_whatever_is_tried_beside_it() -> Non
         assert alone.chance < 1.02 * left + fit.near
 
 
+def test_a_broad_mode_that_hides_the_loops_is_found() -> None:
+    """Its damping is near the greatest, at which a bend would be explained best."""
+    drive, omega = waves(), 2.0 * np.pi * FREQUENCY
+    system = signal.lti([omega**2], [1.0, 2.0 * 0.095 * omega, omega**2])
+    _, moved, _ = signal.lsim(system, drive, PERIOD * np.arange(len(drive)), interp=False)
+    noise = 1e-9 * np.random.default_rng(9).standard_normal(len(drive))
+    fit = AxisFit(*of_plays_alone(drive, GAIN * moved + noise))
+    fit.weigh()
+    found = first_mode(fit)
+    assert found is not None
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.03)
+    assert found.mode[1] == pytest.approx(0.095, rel=0.2)
+
+
+def test_a_mode_is_found_under_the_loops_of_a_slow_drive() -> None:
+    """Below its frequency far more is left in each line, and none of it is noise."""
+    drive = levels(3, 40, 1500)
+    fit = AxisFit(*of_plays_alone(drive, record(of_plays, drive).displacement[:, 0]))
+    fit.weigh()
+    found = next(iter(further_modes(fit)), None)
+    assert found is not None
+    assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.03)
+
+
+def test_what_a_delay_leaves_is_no_mode_above_all_that_moves() -> None:
+    """It would bend the response of slower motion as the delay does, and ring nowhere."""
+    seconds = PERIOD * np.arange(20_000)
+    early, late = (
+        signal.chirp(at, 20.0, seconds[-1], 400.0) * np.minimum(seconds / 0.1, 1.0)
+        for at in (seconds, seconds - 0.4 * PERIOD)
+    )
+    noise = 1e-10 * np.random.default_rng(3).standard_normal(len(early))
+    fit = AxisFit(*of_plays_alone(early, GAIN * late + noise))
+    settle(fit, 4, ("lags",))
+    assert next(iter(further_modes(fit)), None) is None
+
+
 def test_a_bend_of_the_response_is_no_mode() -> None:
     """A lag is explained best by the greatest damping."""
     rng = np.random.default_rng(4)

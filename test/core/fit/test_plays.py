@@ -35,6 +35,22 @@ def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
 
 
+@given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.0, 0.1, 3.0]))
+@settings(max_examples=20)
+def test_each_play_moves_as_it_would_alone(seed: int, spread: float) -> None:
+    """Also from memories in which neighbours lie farther apart than any drive leaves them."""
+    rng, bank = np.random.default_rng(seed), PlayBank(-LIMIT, LIMIT)
+    path, memory = levels(seed, 6, 60), spread * rng.standard_normal(bank.unknowns)
+    theta = bank.unbent()
+    theta[: bank.parts["density"]] = rng.normal(size=bank.parts["density"])
+    plays, tables, expected = bank.start(path, memory), bank.tables(theta), []
+    for volts in path:
+        plays = np.minimum(volts + bank.thresholds, np.maximum(volts - bank.thresholds, plays))
+        each = zip(plays, tables, strict=True)
+        expected.append(sum(np.interp(play, bank.positions, table) for play, table in each))
+    np.testing.assert_allclose(bank.output(theta, path, memory), expected, atol=1e-9)
+
+
 @pytest.mark.parametrize(("low", "high"), [(0.0, 5.0), (-1.0, 4.0), (-3.0, 3.0)])
 def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float) -> None:
     """Also where plays move once from rest and never again: what they moved by is an offset."""

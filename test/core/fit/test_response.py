@@ -1,0 +1,51 @@
+"""The exact response of the linear part, and the states that its derivatives are made of."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal
+
+from afm_scan_ros.core.fit.dynamics import Complex, PoleBank
+from afm_scan_ros.core.fit.response import respond
+from afm_scan_ros.core.fit.stretches import means
+from afm_scan_ros.core.types import Array
+
+PERIOD, COUNT = 1e-4, 400
+NONE = np.zeros(0, complex)
+
+
+def held(pole: complex, inputs: Array, settled: float) -> Complex:
+    """SciPy's state of a pole under held inputs, read before each update."""
+    z = np.exp(pole * PERIOD)
+    states, _ = signal.lfilter([0.0, 1.0 - z], [1.0, -z], inputs + 0j, zi=np.array([settled + 0j]))
+    return np.asarray(states)
+
+
+@given(seed=st.integers(0, 10_000), modes=st.integers(0, 3), settled=st.sampled_from([0.0, 2.0]))
+def test_it_is_that_of_filters_in_series(seed: int, modes: int, settled: float) -> None:
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(500.0, 5000.0, modes) * (-0.02 + 1j)
+    lags, slow = -rng.uniform(2e3, 2e4, 3), rng.uniform(3e-3, 1.0, 4)
+    every, weights = np.concatenate([poles, lags]), rng.normal(size=modes + 3) + 0j
+    weights[:modes] += 1j * rng.normal(size=modes)
+    gains = rng.uniform(0.0, 0.1, 4)
+    inputs = settled + np.cumsum(rng.normal(size=COUNT))
+    edges = np.unique([0, COUNT, *rng.integers(1, COUNT, 40)])
+    found = respond(PoleBank(every, weights, gains, slow, (NONE, NONE)), PERIOD, inputs, settled)
+
+    states = [held(pole, inputs, settled) for pole in every]
+    moved = sum((w * x).real for w, x in zip(weights, states, strict=True))
+    begun = settled * weights.real.sum()
+    late = np.column_stack([held(-1.0 / tau, moved, begun).real for tau in slow])
+    np.testing.assert_allclose(found.output, moved + late @ gains, atol=1e-9)
+
+    of_stretches = found.states(edges)
+    np.testing.assert_allclose(of_stretches.late, means(late, edges), atol=1e-9)
+    for i in range(modes):
+        np.testing.assert_allclose(of_stretches.modes[:, i], means(states[i], edges), atol=1e-9)
+        step = 1e-6 * every[i]
+        up, down = (held(every[i] + way * step, inputs, settled) for way in (1.0, -1.0))
+        slope = means((up - down) / (2.0 * step), edges)
+        np.testing.assert_allclose(of_stretches.changes[:, i], slope, rtol=1e-4, atol=1e-9)
+    lagged = np.column_stack([each.real for each in states[modes:]])
+    np.testing.assert_allclose(of_stretches.lags, means(lagged, edges), atol=1e-9)
