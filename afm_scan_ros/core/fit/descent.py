@@ -198,7 +198,7 @@ def _bent(fit: AxisFit, equations: _Equations, move: Array, lowest: Array) -> Ar
     settings = fit.layout.settings
     try:
         right = fit.bent(move, settings.bend_step, with_operator=not equations.held)
-    except (InputError, ScanError):  # the map behind the operator turns back, or it overflows
+    except (InputError, ScanError):  # a map turns back, a mode does not oscillate, or it overflows
         return move
     acceleration = equations.move(fit.damping, right, 2.0 * (lowest - move))
     sizes = [np.sqrt(each @ equations.metric @ each) for each in (acceleration, move)]

@@ -157,7 +157,7 @@ class AxisFit:
             total = self.misfit(theta) + 0.5 * float(apart @ precision @ apart)
             if self.grows:
                 total += 0.5 * float(np.sum(self.layout.lacking(theta)[1] ** 2))
-        except InputError:  # the map behind the operator turns back
+        except InputError:  # the map behind the operator turns back, or a mode does not oscillate
             return np.inf
         return total if np.isfinite(total) else np.inf
 
@@ -219,7 +219,7 @@ class AxisFit:
         """Right-hand side g for what the second derivative of the model adds to a move.
 
         It is taken over a part of the move. Raises InputError where the map behind the operator
-        turns back there, and ScanError where the response overflows.
+        turns back there or a mode does not oscillate, and ScanError where the response overflows.
         """
         ends = [self.simulated(self.theta + way * part * move) for way in (1.0, -1.0)]
         right, here = np.zeros(self.layout.size), self.simulated(self.theta)

@@ -18,6 +18,7 @@ from scipy.linalg import block_diag
 
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.effects.sensor import SensorModel
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.dynamics import PoleBank
 from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
@@ -134,8 +135,10 @@ class Layout:
         return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:
-        """Return the linear part."""
+        """Return the linear part; raises InputError where a mode would not oscillate."""
         modes = self.of_modes(theta)
+        if any(damping >= 1.0 for _, damping, *_ in modes):
+            raise InputError("a mode of the fit does not oscillate")
         poles = [
             omega * (-damping + 1j * np.sqrt(1.0 - damping**2)) for omega, damping, *_ in modes
         ]

@@ -101,7 +101,10 @@ class Simulation:
 
 
 def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
-    """Simulate a record exactly; raises InputError where the map behind the operator turns back."""
+    """Simulate a record exactly.
+
+    Raises InputError where the map behind the operator turns back, or a mode does not oscillate.
+    """
     operator, mapped = layout.of_operator(theta), layout.map_of(theta)
     before = np.zeros(1) if record.rested else record.drive[:1]
     memory = layout.memory_of(theta, record)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize
 
-from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.descent import _metric, bounded, settle, step
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.one_state import OneState
@@ -47,6 +47,18 @@ def test_a_fit_that_overflows_says_so() -> None:
     fit.gain = 1e200
     with pytest.raises(ScanError, match="diverged"):
         fit.normal(with_operator=True)
+
+
+def test_a_step_to_a_mode_that_does_not_oscillate_is_none_downhill() -> None:
+    drive, mode = levels(4, 6, 300), (2.0 * np.pi * FREQUENCY, DAMPING, 0.5, 0.0)
+    layout, given, gain, theta = of_plays_alone(drive, GAIN * drive)
+    layout, theta = layout.with_mode(theta, mode)
+    fit = AxisFit(layout, given, gain, theta)
+    theta = theta.copy()
+    theta[layout.parts["modes"].start + 1] = -0.1
+    assert fit.objective(theta) == np.inf
+    with pytest.raises(InputError, match="oscillate"):
+        fit.simulated(theta)
 
 
 def test_steps_follow_the_curve_of_a_valley() -> None:
