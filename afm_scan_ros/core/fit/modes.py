@@ -123,15 +123,15 @@ def _summits(
 ) -> Iterator[FoundMode]:
     """Try peaks of what is left, and climb from the best ones to their summits.
 
-    What is explained best by the greatest damping is a bend of the response and no mode, unless it
-    is more of a record than its hysteresis.
+    What is explained best by the greatest damping is a bend of the response and no mode, unless
+    ``enough`` is more of a record than its hysteresis.
     """
     settings = fit.layout.settings
     width = 2.0 * settings.tried_damping
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
     if not peaks:
         return
-    test, found = ScoreTest(fit, free), 0
+    test, found, dominant = ScoreTest(fit, free), 0, _dominant(fit)
     starts = sorted(test.of(peaks), key=_chance, reverse=True)
     for start in starts[: settings.tried_modes]:
         summit = start
@@ -141,7 +141,7 @@ def _summits(
             summit = _climbed(test, summit, dampings)
         bend = summit.mode[1] >= settings.greatest_damping
         summit = max(summit, *test.of(_about(summit, 0.5, NEAR)), key=_chance)
-        bend &= summit.mode[1] >= settings.greatest_damping or summit.chance < _dominant(fit)
+        bend &= summit.mode[1] >= settings.greatest_damping or enough < dominant
         if summit.chance >= enough and not bend:
             found += 1
             yield summit

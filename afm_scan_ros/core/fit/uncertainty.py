@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 from attrs import frozen
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.signal import welch
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals, correlation_length
@@ -61,8 +61,11 @@ def covariance(fit: AxisFit) -> Array:
 
 
 def inverse(fit: AxisFit, matrix: Array) -> Array:
-    """Inverse of a precision of θ, shape (size, size)."""
-    factor = cho_factor(fit.layout.conditioned(matrix))
+    """Inverse of a precision of θ, shape (size, size); raises ScanError where it has none."""
+    try:
+        factor = cho_factor(fit.layout.conditioned(matrix))
+    except LinAlgError as error:
+        raise ScanError("the fit diverged: its parameters have no bound") from error
     return np.asarray(cho_solve(factor, np.eye(len(matrix))))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.alternatives import with_one_state
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.descent import settle
@@ -16,7 +16,7 @@ from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.told import Knowledge
-from afm_scan_ros.core.fit.uncertainty import covariance, predicted
+from afm_scan_ros.core.fit.uncertainty import covariance, inverse, predicted
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
@@ -38,6 +38,13 @@ from helpers.fit_cases import (
 @pytest.fixture(scope="module")
 def drive() -> Array:
     return levels(1, 14, 600)
+
+
+def test_a_fit_without_a_covariance_says_so() -> None:
+    drive = levels(4, 6, 300)
+    fit = AxisFit(*of_plays_alone(drive, GAIN * drive))
+    with pytest.raises(ScanError, match="no bound"):
+        inverse(fit, -np.eye(fit.layout.size))
 
 
 def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
