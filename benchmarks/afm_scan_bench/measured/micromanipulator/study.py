@@ -114,7 +114,8 @@ class Study:
     @cached_property
     def predicted_with_ours(self) -> Array:
         """Displacement (m) under our inverse's drive, the change of drive as the twin sees it."""
-        ours, theirs = (self.twin.predict(d, T) for d in (self.drive_of_ours, self.drive))
+        drives = self.drive_of_ours, self.drive
+        ours, theirs = (self.twin.predict(drive, T, beyond="extend") for drive in drives)
         return self.measured + ours - theirs
 
     def _invert(self, displacement: Array) -> Array:
