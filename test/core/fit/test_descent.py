@@ -29,7 +29,8 @@ from helpers.fit_cases import (
 
 
 @given(seed=st.integers(0, 10_000), size=st.integers(2, 40))
-def test_a_bounded_move_is_that_of_bounded_least_squares(seed: int, size: int) -> None:
+def test_no_bounded_least_squares_lowers_the_objective_more(seed: int, size: int) -> None:
+    """SciPy's may end short of the least value, by 1e-6 of it for one seed of thousands."""
     rng = np.random.default_rng(seed)
     columns, data = rng.standard_normal((size + 5, size)), rng.standard_normal(size + 5)
     lowest = np.where(rng.random(size) < 0.7, -0.1 * rng.random(size), -np.inf)
@@ -38,7 +39,10 @@ def test_a_bounded_move_is_that_of_bounded_least_squares(seed: int, size: int) -
     ends = np.where(free, lowest, -1e-12), np.where(free, np.inf, 1e-12)
     options = {"method": "bvls", "tol": 1e-14, "max_iter": 100 * size}
     expected = optimize.lsq_linear(columns, data, ends, **options).x
-    np.testing.assert_allclose(move, expected, atol=1e-6)
+    left, beside = (float(np.sum((columns @ each - data) ** 2)) for each in (move, expected))
+    assert left < beside + 1e-9 * float(data @ data)
+    assert np.all(move >= lowest)
+    assert not move[~free].any()
 
 
 def test_a_fit_that_overflows_says_so() -> None:
