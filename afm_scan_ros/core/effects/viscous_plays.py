@@ -69,12 +69,16 @@ def halley(miss: float, slope: float, curvature: float) -> float:
 def next_try(
     u: float, step: float, tried: tuple[float, float], bounds: tuple[float, float]
 ) -> float:
-    """Return a step's end; where it leaves the bracket, the bracket's middle or the outer bound."""
+    """Return a step's end; where it leaves the bracket, the bracket's middle or the outer bound.
+
+    From one bound a step never leads to the other, from where it might lead back.
+    """
     there = u + step
     if tried[0] < there < tried[1]:
         return there
     side = 0 if step < 0.0 else 1
-    return bounds[side] if tried[side] == bounds[side] else 0.5 * (tried[0] + tried[1])
+    outer = tried[side] == bounds[side] and u != bounds[1 - side]
+    return bounds[side] if outer else 0.5 * (tried[0] + tried[1])
 
 
 def refuse_unsolved(solved: int, wanted: Array, found: Array) -> None:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.viscous_plays import ROUNDS, first_try, halley, next_try
@@ -36,6 +36,7 @@ def test_a_step_goes_against_the_miss_by_two_thirds_to_twice_newtons(
     root=st.floats(-4.0, 4.0),
     start=st.floats(-4.0, 4.0),
 )
+@example((4.0, 0.0, 1.0), 0.0, (0.0, 2.0), 1.0, 4.0)
 def test_the_root_is_found_whatever_the_slopes(
     pieces: tuple[float, float, float],
     bend: float,
