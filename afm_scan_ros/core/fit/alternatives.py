@@ -171,22 +171,26 @@ def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
     other.theta[laid.parts["lags"].start] = 1.0 - sum(mode[2] for mode in laid.of_modes(fit.theta))
     other.theta[laid.parts["sensor"]] = np.log(corner)
     other.weigh()
-    for _ in range(settings.most_steps // settings.stage_steps):
-        settle(other, settings.stage_steps, LINEAR)
-        left = _least_left(other) / fit.discrepancy**2
-        hopeless = laid.modes > 0 and left > 1.0 - settings.mode_share
-        if hopeless or other.converged or other.stalled:
-            break
+    enough = np.sqrt(1.0 - settings.mode_share) * fit.discrepancy
+    _settle_while_hopeful(other, enough if laid.modes else np.inf)
     if laid.modes == 0:
         every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
-        other = min([other, *every], key=_least_left)
-    return other if _least_left(other) / fit.discrepancy**2 < 1.0 - settings.mode_share else None
+        other = min([other, *every], key=lambda each: each.discrepancy)
+    return other if other.discrepancy < enough else None
 
 
-def _least_left(fit: AxisFit) -> float:
-    """η² of a fit once it has converged, at least: what may remain counts ``decided``-fold."""
-    remaining = 0.0 if fit.converged else fit.layout.settings.decided * fit.remaining
-    return fit.discrepancy**2 * max(0.0, 1.0 - remaining / fit.misfit(fit.theta))
+def _settle_while_hopeful(fit: AxisFit, enough: float) -> None:
+    """Settle all but the operator, as long as η may fall below what is ``enough``.
+
+    The squares of the residuals may fall by ``decided`` times as much as the last step foresaw.
+    """
+    settings = fit.layout.settings
+    for _ in range(settings.most_steps // settings.stage_steps):
+        settle(fit, settings.stage_steps, LINEAR)
+        falls = settings.decided * fit.remaining / fit.misfit(fit.theta)
+        hopeless = fit.discrepancy * np.sqrt(max(0.0, 1.0 - falls)) > enough
+        if hopeless or fit.converged or fit.stalled:
+            break
 
 
 def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:

@@ -66,15 +66,10 @@ def first_mode(fit: AxisFit) -> FoundMode | None:
     free = np.zeros(fit.layout.size, bool)
     for name in ("lags", "creep"):
         free[fit.layout.parts[name]] = True
-    every = _summits(fit, free, _dominant(fit), 1)
-    return next((one for one in every if _resounds(one, fit)), None)
-
-
-def _dominant(fit: AxisFit) -> float:
-    """What a mode explains at least (nat) that is more of a record than its hysteresis."""
     lefts = zip(fit.records, fit.residuals(), strict=True)
-    each = [float(left @ left) / fit.variance(record) for record, left in lefts]
-    return 0.5 * fit.layout.settings.dominant_share * max(each)
+    most = max(0.5 * float(left @ left) / fit.variance(record) for record, left in lefts)
+    every = _summits(fit, free, fit.layout.settings.dominant_share * most, 1, broad=True)
+    return next((one for one in every if _excited(one, fit)), None)
 
 
 def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
@@ -87,26 +82,25 @@ def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
     settings, spectra = fit.layout.settings, _spectra(fit)
     free = fit.theta > fit.layout.lowest()
     every = _summits(fit, free, settings.mode_chance, most)
-    return [one for one in every if _seen(one, spectra, settings) and _resounds(one, fit)]
+    return [one for one in every if _seen(one, spectra, settings) and _excited(one, fit)]
 
 
-def _resounds(found: FoundMode, fit: AxisFit) -> bool:
+def _excited(found: FoundMode, fit: AxisFit) -> bool:
     """Whether some of what a mode explains is about its own frequency, above noise.
 
-    One far above all that moves only bends the response of the others, as a delay would.
-
-    The spectra are means over parts of each record, as a sweep passes the mode in one of them.
+    A mode far above all that the drives excite only delays the slower response. The spectra are
+    means over segments of each record, since a sweep passes the mode in one of them.
     """
     settings, left = fit.layout.settings, 0.0
     ends = found.mode[0] * np.array([1.0 - settings.mode_band, 1.0 + settings.mode_band])
     for record, residual in zip(fit.records, fit.residuals(), strict=True):
-        parts = len(residual) // settings.residual_segments
-        at, density = welch(residual, 1.0 / record.length, nperseg=parts)
+        segment = -(-len(residual) // settings.residual_segments)
+        at, density = welch(residual, 1.0 / record.length, nperseg=segment)
         first, last = np.searchsorted(2.0 * np.pi * at, ends)
         band = density[max(first - 1, 0) : last + 1] * 0.5 / record.length
         above = float(np.sum(band - record.noise**2 / record.block)) / fit.variance(record)
         left += max(above, 0.0) * settings.residual_segments
-    return left > settings.own_share * found.chance
+    return left > settings.excited_share * found.chance
 
 
 def _seen(found: FoundMode, spectra: Sequence[Spectrum], settings: FitSettings) -> bool:
@@ -119,19 +113,19 @@ def _seen(found: FoundMode, spectra: Sequence[Spectrum], settings: FitSettings) 
 
 
 def _summits(
-    fit: AxisFit, free: NDArray[np.bool_], enough: float, most: int
+    fit: AxisFit, free: NDArray[np.bool_], enough: float, most: int, *, broad: bool = False
 ) -> Iterator[FoundMode]:
     """Try peaks of what is left, and climb from the best ones to their summits.
 
-    What is explained best by the greatest damping is a bend of the response and no mode, unless
-    ``enough`` is more of a record than its hysteresis.
+    What is explained best by the greatest damping is a bend of the response and no mode. A
+    ``broad`` mode may have this damping while it is sought, if a lesser one is best in the end.
     """
     settings = fit.layout.settings
     width = 2.0 * settings.tried_damping
     peaks = [(omega, settings.tried_damping) for omega in _peaks(fit, width, enough)]
     if not peaks:
         return
-    test, found, dominant = ScoreTest(fit, free), 0, _dominant(fit)
+    test, found = ScoreTest(fit, free), 0
     starts = sorted(test.of(peaks), key=_chance, reverse=True)
     for start in starts[: settings.tried_modes]:
         summit = start
@@ -139,10 +133,10 @@ def _summits(
             return
         for dampings in (EQUAL, HALF_OR_TWICE):
             summit = _climbed(test, summit, dampings)
-        bend = summit.mode[1] >= settings.greatest_damping
+        sought = summit.mode[1]
         summit = max(summit, *test.of(_about(summit, 0.5, NEAR)), key=_chance)
-        bend &= summit.mode[1] >= settings.greatest_damping or enough < dominant
-        if summit.chance >= enough and not bend:
+        damping = min(sought, summit.mode[1]) if broad else sought
+        if summit.chance >= enough and damping < settings.greatest_damping:
             found += 1
             yield summit
 

@@ -5,7 +5,8 @@ parameters θ fitted anew with it, the objective would fall by
 
     ½ gᵀ κ,    κ = S⁻¹ g,    S = H_κκ - H_κθ H_θθ⁻¹ H_θκ,    g = b_κ - H_κθ H_θθ⁻¹ b_θ,
 
-with the normal equations' H and b. The derivatives by θ are made once for all modes.
+with the normal equations' H and b. H_θθ is made once for all modes; H_θκ is the transposed Jacobian
+times the derivatives by κ.
 Source: C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50.
 """
 

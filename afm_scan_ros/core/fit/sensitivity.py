@@ -48,6 +48,7 @@ def pulled(simulation: Simulation, pieces: Iterable[Columns] | None, pull: Array
     """Return Jᵀ pull, shape (size, n), with the J of ``jacobian``, without making it.
 
     What V and C do to the columns of J is done backwards to ``pull``, (stretches that count, n).
+    Without ``pieces`` the rows of the record's memory are zero.
     """
     layout, record = simulation.layout, simulation.record
     parts, whole = layout.parts, np.zeros((len(record.edges) - 1, pull.shape[1]))

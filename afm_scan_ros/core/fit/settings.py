@@ -275,7 +275,7 @@ class FitSettings:
         "least share of the residuals in its band that a mode explains beside a smooth response",
         "seen on scanners made for tests: no derivation",
     )
-    own_share: float = setting(
+    excited_share: float = setting(
         0.01,
         "1",
         "least share of what a mode explains that is about its own frequency, above noise",
