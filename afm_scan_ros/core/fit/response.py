@@ -12,7 +12,7 @@ from attrs import frozen
 
 from afm_scan_ros.core.compiled import regrouped
 from afm_scan_ros.core.fit.dynamics import Complex, PoleBank, States
-from afm_scan_ros.core.fit.stretches import Edges, averaged
+from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
 
 
@@ -29,10 +29,6 @@ class Response:
     settled: float
     fast: Array
     output: Array
-
-    def mean(self, block: int) -> Array:
-        """Means of the output over blocks, shape (blocks,)."""
-        return averaged(self.output, block)
 
     def states(self, edges: Edges) -> States:
         """Means over stretches of what the output's derivatives hold."""

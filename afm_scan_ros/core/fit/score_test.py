@@ -15,7 +15,7 @@ from copy import copy
 from typing import TypeAlias
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
@@ -92,9 +92,10 @@ class ScoreTest:
         fit, at = self.fit, weights - wider.layout.parts["lags"].start
         own, shared = np.zeros((len(at), len(at))), np.zeros((len(self.free), len(at)))
         pull, here = np.zeros(len(at)), fit.simulated(fit.theta)
+        linear = wider.layout.dynamics(wider.theta)
         every = zip(fit.records, here, self._pieces, self._left, strict=True)
         for k, (record, simulation, pieces, left) in enumerate(every):
-            with_modes = simulation.with_theta(wider.layout, wider.theta)
+            with_modes = evolve(simulation, layout=wider.layout, theta=wider.theta, dynamics=linear)
             columns = with_modes.vibration[record.stretches][:, at]
             columns *= fit.gain * record.weights[:, np.newaxis]
             free, variance = fit.free_of(k, gathered=True), fit.variance(record)

@@ -11,7 +11,7 @@ from afm_scan_ros.core.fit.parameters import Layout
 from afm_scan_ros.core.fit.response import Response, respond
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.stretch_filter import StretchFilter
-from afm_scan_ros.core.fit.stretches import means
+from afm_scan_ros.core.fit.stretches import averaged, means
 from afm_scan_ros.core.types import Array
 
 
@@ -19,8 +19,7 @@ from afm_scan_ros.core.types import Array
 class Simulation:
     """A record at θ: effective input F (V), (n,), and the response for a gain of 1.
 
-    The scanner had settled under the input ``settled`` (V). ``output`` are means of the response
-    over blocks, (blocks,).
+    The scanner had settled under the input ``settled`` (V).
     """
 
     layout: Layout
@@ -29,12 +28,16 @@ class Simulation:
     effective: Array
     settled: float
     dynamics: PoleBank
-    response: Response
-    output: Array
 
-    def with_theta(self, layout: Layout, theta: Array) -> "Simulation":
-        """Simulate the same record under the same effective input."""
-        return _responded(layout, theta, self.record, self.effective, self.settled)
+    @cached_property
+    def response(self) -> Response:
+        """Response to F, sample by sample."""
+        return respond(self.dynamics, self.record.period, self.effective, self.settled)
+
+    @cached_property
+    def output(self) -> Array:
+        """Means of the response over blocks, (blocks,)."""
+        return averaged(self.response.output, self.record.block)
 
     @cached_property
     def states(self) -> States:
@@ -111,16 +114,7 @@ def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
     raw, rest = (layout.operator.output(operator, one, memory) for one in (record.drive, before))
     if mapped is not None:
         raw, rest = mapped.output(raw), mapped.output(rest)
-    return _responded(layout, theta, record, raw, float(rest[0]))
-
-
-def _responded(
-    layout: Layout, theta: Array, record: Signals, effective: Array, settled: float
-) -> Simulation:
-    dynamics = layout.dynamics(theta)
-    response = respond(dynamics, record.period, effective, settled)
-    given = effective, settled, dynamics, response, response.mean(record.block)
-    return Simulation(layout, theta, record, *given)
+    return Simulation(layout, theta, record, raw, float(rest[0]), layout.dynamics(theta))
 
 
 def at_rest(layout: Layout, theta: Array) -> Array:
