@@ -17,7 +17,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
 from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.fit.simulation import at_rest
-from afm_scan_ros.core.fit.starts import begun_at_rest, counted_from_rest
+from afm_scan_ros.core.fit.starts import begun_at_rest, left_out
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback
 
@@ -57,17 +57,17 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
     """
     unknown = [k for k, record in enumerate(fit.records) if not record.rested]
     estimated = [k for k, record in enumerate(fit.records) if record.unknown is not None]
-    if fit.at_noise or not unknown:
+    if not unknown:
         return fit
-    before, name = fit, "rest before all records"
-    resting, lead = _compared(fit, partial(begun_at_rest, fit, unknown), progress, name, groups)
-    clear = fit.layout.settings.mode_chance
+    clear, name = fit.layout.settings.mode_chance, "rest before all records"
+    resting = partial(begun_at_rest, fit, unknown)
+    other, lead = _compared(fit, resting, progress, name, groups, left_out(fit))
     if lead > clear:
-        return counted_from_rest(resting)
+        return other
     for k in estimated if len(unknown) > 1 and lead < -clear else []:
         name = f"rest before {fit.records[k].name}"
         fit = _preferred(fit, partial(begun_at_rest, fit, [k]), progress, name, groups)
-    return fit if fit is before else counted_from_rest(fit)
+    return fit
 
 
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
@@ -105,8 +105,11 @@ def _compared(
     progress: ProgressCallback,
     name: str,
     groups: Sequence[str] = (),
+    handicap: float = 0.0,
 ) -> tuple[AxisFit, float]:
     """Return a changed fit and by how much its evidence leads (nat), after steps of some groups.
+
+    The ``handicap`` (nat) is the evidence of what only the changed fit counts.
 
     The evidence is that of independent residuals, so the lead is divided by their correlation
     length. A fit that diverges is none of the scanner's, and none leads where there is none.
@@ -115,10 +118,10 @@ def _compared(
         other = changed()
         if other is None:
             return fit, -np.inf
-        lead = _lead(fit, other, groups)
+        lead = _lead(fit, other, groups, handicap)
         if lead > 0.0:
             settle(other, other.layout.settings.most_steps, groups, searching=True)
-            lead = other.evidence() - fit.evidence()
+            lead = other.evidence() - fit.evidence() - handicap
     except ScanError as error:
         progress(f"{name}: {error}")
         return fit, -np.inf
@@ -132,7 +135,7 @@ def _longest_correlation(fit: AxisFit) -> float:
     return max(map(correlation_length, fit.residuals()))
 
 
-def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str]) -> float:
+def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str], handicap: float) -> float:
     """By how much (nat) another fit has the greater evidence.
 
     Both take steps in turn until they converge or stall, or what may remain of the objective of
@@ -142,7 +145,7 @@ def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str]) -> float:
     for _ in range(settings.most_steps // settings.stage_steps):
         for each in (fit, other):
             settle(each, settings.stage_steps, groups, searching=True)
-        lead = other.evidence() - fit.evidence()
+        lead = other.evidence() - fit.evidence() - handicap
         beyond = lead - settings.mode_chance * _longest_correlation(other)
         remaining = fit.remaining if beyond > 0.0 else other.remaining
         decided = abs(beyond) > settings.decided * remaining
@@ -166,7 +169,7 @@ def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
         return None
     laid = evolve(fit.layout, sensor_order=order)
     other = AxisFit(laid, list(fit.records), fit.gain, laid.start(), fit.discrepancy)
-    for name in (*fit.layout.operator.parts, "map", "modes", "creep", "memory"):
+    for name in (*fit.layout.operator.parts, "map", "modes", "creep", "rest", "memory"):
         other.theta[laid.parts[name]] = fit.theta[fit.layout.parts[name]]
     other.theta[laid.parts["lags"].start] = 1.0 - sum(mode[2] for mode in laid.of_modes(fit.theta))
     other.theta[laid.parts["sensor"]] = np.log(corner)
@@ -232,7 +235,7 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     )
     widths = low - margin, high + margin
     operator = OneState(layout.operator.lower, layout.operator.upper, widths, layout.settings)
-    linear = fit.theta[layout.parts["lags"].start : layout.parts["memory"].start]
+    linear = fit.theta[layout.parts["lags"].start : layout.parts["rest"].start]
     begun = np.array([output[0] - drive[0] for drive, output in paths])
     memory = begun[[one.unknown is not None for one in fit.records]]
     starts = [np.concatenate([one, linear, memory]) for one in operator.started(paths)]

@@ -85,21 +85,23 @@ def fit_axis(
 def _of_plays(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Fit the plays, the modes that they leave, and tones; the map behind the plays comes last.
 
-    Whether records began at rest is asked before, for a start that is wrong hides all else.
+    Whether records began at rest is asked before where their memory is estimated, for a start that
+    is wrong hides all else, and again behind the map, where less is left to hide it.
     """
     settings = fit.layout.settings
-    by_plays = (*fit.layout.operator.parts, *LINEAR, "memory")
+    by_plays = (*fit.layout.operator.parts, *LINEAR, "rest", "memory")
     settle(fit, settings.stage_steps, by_plays)
     fit.find_tones()
     while add_mode(fit):
         settle(fit, settings.stage_steps, by_plays)
         fit.find_tones()
-    fit = with_rest(fit, progress, by_plays)
+    if fit.layout.unknown_starts:
+        fit = with_rest(fit, progress, by_plays)
     settle(fit, settings.stage_steps)
     fit.find_tones()
     settle(fit, settings.stage_steps, searching=True)
     fit.find_tones()
-    return fit
+    return with_rest(fit, progress)
 
 
 def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:

@@ -24,6 +24,7 @@ from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
 from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
 from afm_scan_ros.core.fit.signals import Signals, noise_of
 from afm_scan_ros.core.fit.simulation import Simulation, simulate
+from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.fit.tones import find_tones, offered_tones
 from afm_scan_ros.core.types import Array
 
@@ -76,7 +77,7 @@ class AxisFit:
     grows: bool = False
     damping: float = field()
     damping_alone: float = 1.0
-    _columns: dict[int, tuple[Array | None, list[Columns]]] = field(factory=dict)
+    _columns: dict[int, tuple[Array, list[Columns]]] = field(factory=dict)
     _regressors: dict[int, tuple[object, dict[bool, tuple[Array, Array]]]] = field(factory=dict)
     _last: tuple[Layout, Array, list[Simulation]] | None = None
 
@@ -274,18 +275,18 @@ class AxisFit:
         self.discrepancy = float(np.exp(minimize_scalar(unlikely, bounds=ends).x))
 
     def find_tones(self) -> bool:
-        """Let sines in the residuals be free in their records; return whether any are new.
+        """Let sines in the residuals be free in their records; return whether there are more.
 
-        A record too short to show a sine is tried for those of the others, and for mains.
+        They are sought anew each time, as one may have been what the model lacked. A record too
+        short to show a sine is tried for those of the others, and for mains.
         """
-        settings = self.layout.settings
-        simulations, before = self.simulated(self.theta), [one.tones for one in self.records]
-        lefts = self.residuals()
-        for k, left in enumerate(lefts):
-            record = self.records[k]
-            motion = self.gain * simulations[k].output[record.used]
-            given = left, motion, self.discrepancy, record.length
-            self.records[k] = record.with_tones(find_tones(*given, settings), settings.tone_most)
+        settings, before = self.layout.settings, sum(len(one.tones) for one in self.records)
+        lefts = list(self._with_tones())
+        for k, (record, left) in enumerate(zip(self.records, lefts, strict=True)):
+            drive = averaged(record.drive, record.block)[record.used]
+            motion = self.gain * self.simulated(self.theta)[k].output[record.used]
+            found = find_tones(left, drive, motion, record.length, settings)
+            self.records[k] = evolve(record, tones=()).with_tones(found, settings.tone_most)
         known = {tone for record in self.records for tone in record.tones}
         known |= {settings.slower_mains, settings.faster_mains}
         for k, left in enumerate(lefts):
@@ -296,7 +297,15 @@ class AxisFit:
             found = offered_tones(left, record.seconds, hidden, expected, settings)
             self.records[k] = record.with_tones(found, settings.tone_most)
         self.weigh()
-        return before != [one.tones for one in self.records]
+        return sum(len(one.tones) for one in self.records) > before
+
+    def _with_tones(self) -> Iterator[Array]:
+        """Yield what the model leaves of each record, its tones included, m."""
+        lefts = self._without(self.theta, gathered=False)
+        for k, (record, (left, without)) in enumerate(zip(self.records, lefts, strict=True)):
+            free, first = self.free_of(k, gathered=False), -4 * len(record.tones)
+            tones = free.columns[:, first:] @ free.weights(left)[first:] if first else 0.0
+            yield without + tones
 
     def tone_amplitudes(self) -> list[tuple[tuple[float, float], ...]]:
         """Frequency (Hz) and amplitude (m), in the middle of the record, of each record's tones."""
@@ -317,7 +326,7 @@ class AxisFit:
         """Take another layout: operator, sensor and memories stay, the linear part begins anew."""
         before, theta = self.layout.parts, self.theta
         self.layout, self.theta = layout, layout.start()
-        for name in (*layout.operator.parts, "map", "sensor", "memory"):
+        for name in (*layout.operator.parts, "map", "sensor", "rest", "memory"):
             self.theta[layout.parts[name]] = theta[before[name]]
 
     def free_of(self, k: int, *, gathered: bool) -> Free:
@@ -340,16 +349,15 @@ class AxisFit:
         """
         operator, record = self.layout.operator, self.records[k]
         theta = self.layout.of_operator(self.theta)
-        memory = self.layout.memory_of(self.theta, record)
+        start, _ = self.layout.start_of(self.theta, record)
         if k in self._columns:
             kept, pieces = self._columns[k]
-            near = 0.5 * self.layout.settings.play_step * operator.half
-            if memory is None or kept is None or np.abs(memory - kept).max() < near:
+            if np.abs(start - kept).max() < 0.5 * self.layout.settings.play_step * operator.half:
                 return pieces
-        made = operator.pieces(theta, record.drive, record.edges, memory)
+        made = operator.pieces(theta, record.drive, record.edges, start)
         if not operator.linear:
             return made
-        self._columns[k] = memory, list(made)
+        self._columns[k] = start, list(made)
         return self._columns[k][1]
 
 

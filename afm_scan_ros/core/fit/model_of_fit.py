@@ -29,9 +29,9 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     layout, theta = fit.layout, fit.layout.of_operator(fit.theta)
     levels = layout.settings.direct_levels
     if isinstance(layout.operator, Plays):
-        surface, mapped = from_rest(
-            layout.operator.surface(theta, mixed=True), layout.map_of(fit.theta)
-        )
+        bias, _ = layout.operator.bias(fit.theta[layout.parts["rest"]])
+        surface = layout.operator.surface(theta, bias, mixed=True)
+        surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
     slopes = layout.operator.slopes(theta)
     nearest = nearest_surface(slopes, layout.settings)
@@ -81,7 +81,9 @@ def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurfac
     drive = np.interp(np.arange(places[-1] + 1), places, corners)
     model, plays = Duhem(slopes), Plays(slopes.lower, slopes.upper, settings)
     output = model.apply(model.at_rest(), drive)[1]
-    pieces = plays.pieces(plays.unbent(), drive, np.arange(len(drive) + 1), None)
+    pieces = plays.pieces(
+        plays.unbent(), drive, np.arange(len(drive) + 1), plays.at_rest(np.zeros(1))[0]
+    )
     columns = np.concatenate([one[:, : len(plays.thresholds)] for one in pieces]).astype(float)
     density, _ = nnls(columns - columns.mean(axis=0), output - output.mean())
     theta = np.zeros_like(plays.unbent())

@@ -83,25 +83,41 @@ class OneState:
         """Standard deviation of w (V) at an unknown start: anywhere between both ``widths``."""
         return np.array([(self.widths[1] - self.widths[0]) / np.sqrt(12.0)])
 
-    def output(self, theta: Array, drive: Array, memory: Array | None) -> Array:
-        """A (V) for a drive (V), both (n,), of a scanner in use from w = ``memory`` on, (1,)."""
-        now = _now(drive, memory)
+    rests = 0
+
+    def expected_rest(self) -> Array:
+        """At depolarised rest nothing is unknown."""
+        return np.zeros(0)
+
+    def at_rest(self, _rest: Array) -> tuple[Array, Array]:
+        """Drive and w (V) at depolarised rest, (2,), and its derivatives by nothing, (2, 0)."""
+        return np.zeros(2), np.zeros((2, 0))
+
+    def in_use(self, drive: float, memory: Array) -> tuple[Array, Array]:
+        """Drive and w (V), (2,), of a scanner in use, and the derivatives by its memory, (2, 1)."""
+        return np.append(drive, memory), np.array([[0.0], [1.0]])
+
+    def output(self, theta: Array, drive: Array, start: Array) -> Array:
+        """A (V) for a drive (V), both (n,), after drive and w (V) at the ``start``, (2,)."""
         count = self.settings.slope_cells_drive
         line = np.ones(count + 3), np.linspace(self.lower, self.upper, count + 1)
-        return by_input(theta.reshape(self.shape), line, self.cells, now, drive)
+        return by_input(theta.reshape(self.shape), line, self.cells, start.copy(), drive)
 
-    def remembered(self, theta: Array, drive: Array, edges: Edges, memory: Array) -> Array:
-        """∂A/∂memory averaged over stretches, shape (stretches, 1), by a difference."""
-        apart = np.sqrt(np.finfo(float).eps) * self.half
-        ends = (self.output(theta, drive, memory + way * apart) for way in (1.0, -1.0))
-        up, down = (means(one, edges) for one in ends)
-        return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))
+    def remembered(
+        self, theta: Array, drive: Array, edges: Edges, start: tuple[Array, Array]
+    ) -> Array:
+        """∂A/∂memory averaged over stretches, (stretches, unknowns), by differences."""
+        apart, (now, changes) = np.sqrt(np.finfo(float).eps) * self.half, start
+        result = np.zeros((len(edges) - 1, changes.shape[1]))
+        for k, change in enumerate(changes.T):
+            ends = (self.output(theta, drive, now + way * apart * change) for way in (1.0, -1.0))
+            up, down = (means(one, edges) for one in ends)
+            result[:, k] = (up - down) / (2.0 * apart)
+        return result
 
-    def pieces(
-        self, theta: Array, drive: Array, edges: Edges, memory: Array | None
-    ) -> Iterator[Array]:
+    def pieces(self, theta: Array, drive: Array, edges: Edges, start: Array) -> Iterator[Array]:
         """Yield ∂A/∂theta averaged over stretches, in pieces of shape (stretches, parameters)."""
-        now, grown = _now(drive, memory), self.unbent()
+        now, grown = start.copy(), self.unbent()
         tables, at_once = theta.reshape(self.shape), self.settings.rows_at_once
         for first in range(0, len(edges) - 1, at_once):
             part = edges[first : first + at_once + 1]
@@ -174,10 +190,6 @@ class OneState:
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper
         return DuhemSlopes(*ends, self.lower, 0.0, self.widths, slope, rising, falling)
-
-
-def _now(drive: Array, memory: Array | None) -> Array:
-    return np.array([0.0, 0.0]) if memory is None else np.append(drive[0], memory)
 
 
 def _third(size: int) -> Array:

@@ -43,8 +43,8 @@ class Layout:
     """Which parameter is where in θ, and what is known of each beforehand.
 
     ``lags`` (s), of which the first is faster than any record shows, and creep's
-    ``time_constants`` (s) have fixed places. Last comes what each record of an unknown start
-    remembers.
+    ``time_constants`` (s) have fixed places. Last come where depolarised rest is, and what each
+    record of an unknown start remembers.
     """
 
     operator: Operator
@@ -65,6 +65,7 @@ class Layout:
             "modes": 4 * self.modes,
             "creep": len(self.time_constants),
             "sensor": 1 if self.sensor_order else 0,
+            "rest": self.operator.rests,
             "memory": self.unknown_starts * self.operator.unknowns,
         }
         ends = np.cumsum([0, *sizes.values()])
@@ -93,18 +94,30 @@ class Layout:
         return OutputMap(*ends, tuple(bends)) if bends.any() else None
 
     def memory_part(self, record: Signals) -> slice:
-        """Place in θ of what a record of unknown start remembers; an empty one for any other."""
+        """Place in θ of what says where a record begins; an empty one where nothing does."""
+        if record.rested:
+            return self.parts["rest"]
         first, count = self.parts["memory"].start, self.operator.unknowns
         if record.unknown is None:
             return slice(first, first)
         return slice(first + count * record.unknown, first + count * (record.unknown + 1))
 
-    def memory_of(self, theta: Array, record: Signals) -> Array | None:
-        """What a record remembers at its start (V), None of depolarised rest."""
+    def start_of(self, theta: Array, record: Signals) -> tuple[Array, Array]:
+        """Return the operator's state (V) before a record, and its derivatives by that part of θ.
+
+        A record of a memory that is neither known nor estimated counts from where it is wiped out.
+        """
         if record.rested:
-            return None
-        found = theta[self.memory_part(record)]
-        return found if len(found) else np.zeros(self.operator.unknowns)
+            return self.at_rest(theta)
+        part = self.memory_part(record)
+        memory = theta[part] if part != slice(part.start, part.start) else None
+        known = np.zeros(self.operator.unknowns) if memory is None else memory
+        state, changes = self.operator.in_use(float(record.drive[0]), known)
+        return state, changes if memory is not None else changes[:, :0]
+
+    def at_rest(self, theta: Array) -> tuple[Array, Array]:
+        """Return the operator's state (V) at depolarised rest, and its derivatives by ``rest``."""
+        return self.operator.at_rest(theta[self.parts["rest"]])
 
     def of_modes(self, theta: Array) -> list[Mode]:
         """Return the modes, of which θ holds ln ω, -ln ζ and both parts of κ."""
@@ -200,6 +213,7 @@ class Layout:
         bent = np.diff(np.eye(len(self.time_constants)), 2, axis=0)
         groups.append((bent.T @ bent + 0.1 * np.eye(bent.shape[1])) / scales["creep"] ** 2)
         groups.append(np.eye(1 if self.sensor_order else 0))
+        groups.append(np.diag(self.operator.expected_rest() ** -2.0))
         groups += self.unknown_starts * [np.diag(self.operator.expected_memory() ** -2.0)]
         matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)
         matrix += np.outer(self.static, self.static) / np.finfo(np.float32).eps

@@ -180,33 +180,66 @@ class Plays:
         shares = np.arange(1.0, self.unknowns + 1.0) / self.unknowns
         return np.asarray(self.half / np.sqrt(3.0) * shares)
 
-    def start(self, drive: Array, memory: Array | None) -> Array:
-        """Plays before a drive (V), of a scanner at depolarised rest or of one in use.
+    rests = 1
+    """Number of values that say where the plays lie at depolarised rest."""
 
-        One in use has been at both ends of the range. How far its plays then lie from the start of
-        the drive is its ``memory`` (V), linear between a few thresholds, and none at depolarised
-        rest.
+    def expected_rest(self) -> Array:
+        """Standard deviation of the value that gives the bias of depolarised rest, V, (1,)."""
+        return np.array([self.settings.rest_bias * self.half])
+
+    def bias(self, rest: Array) -> tuple[float, float]:
+        """Bias of depolarised rest (V) for its value in θ (V), (1,), and the derivative by that.
+
+        It stays within ``rest_bias`` of half the range.
         """
-        if memory is None:
-            return np.zeros(len(self.thresholds))
-        apart = np.clip(self._hats @ memory, -self.thresholds, self.thresholds)
-        return np.where(self.thresholds > self.half, self.settled, float(drive[0]) + apart)
+        most = self.settings.rest_bias * self.half
+        share = float(np.tanh(rest[0] / most))
+        return most * share, 1.0 - share**2
 
-    def remembered(self, theta: Array, drive: Array, edges: Edges, memory: Array) -> Array:
-        """∂P/∂memory averaged over stretches, (stretches, unknowns): of plays that never moved."""
-        start, tables, count = self.start(drive, memory), self.tables(theta), len(edges) - 1
+    def at_rest(self, rest: Array) -> tuple[Array, Array]:
+        """Plays (V) of a depolarised scanner, and their derivatives by ``rest``, (plays, 1).
+
+        Each rests in the middle of an oscillation as large as its threshold. A map before the
+        hysteresis moves that middle by the square of the amplitude, and by the bias (V) that of one
+        as large as half the range.
+        """
+        (bias, slope), moved = self.bias(rest), np.square(self.thresholds / self.half)
+        limits = np.where(self.thresholds > self.half, 0.0, self.thresholds)
+        inside = np.abs(moved * bias) < limits
+        changes = slope * (moved * inside)[:, np.newaxis]
+        return np.clip(moved * bias, -limits, limits), changes
+
+    def in_use(self, drive: float, memory: Array) -> tuple[Array, Array]:
+        """Plays (V) of a scanner in use, and their derivatives by its memory, (plays, unknowns).
+
+        It has been at both ends of the range. How far its plays then lie from the ``drive`` (V) is
+        its ``memory`` (V), linear between a few thresholds, and none at depolarised rest.
+        """
+        apart = self._hats @ memory
+        inside = np.abs(apart) < self.thresholds
+        plays = float(drive) + np.clip(apart, -self.thresholds, self.thresholds)
+        start = np.where(self.thresholds > self.half, self.settled, plays)
+        return start, self._hats * inside[:, np.newaxis]
+
+    def remembered(
+        self, theta: Array, drive: Array, edges: Edges, start: tuple[Array, Array]
+    ) -> Array:
+        """∂P/∂memory averaged over stretches, (stretches, unknowns): of plays that never moved.
+
+        ``start`` holds the plays before the drive, and their derivatives.
+        """
+        (plays, changes), tables, count = start, self.tables(theta), len(edges) - 1
         slopes = [
             np.interp(at, self.positions, each)
-            for at, each in zip(start, np.gradient(tables, self.positions, axis=1), strict=True)
+            for at, each in zip(plays, np.gradient(tables, self.positions, axis=1), strict=True)
         ]
-        free = np.abs(self._hats @ memory) < self.thresholds
-        each = self._hats * (np.array(slopes) * free)[:, np.newaxis]
+        each = changes * np.array(slopes)[:, np.newaxis]
         highest, lowest = np.maximum.accumulate(drive), -np.minimum.accumulate(drive)
         moved = np.minimum(
-            np.searchsorted(highest, start + self.thresholds, "right"),
-            np.searchsorted(lowest, self.thresholds - start, "right"),
+            np.searchsorted(highest, plays + self.thresholds, "right"),
+            np.searchsorted(lowest, self.thresholds - plays, "right"),
         )
-        lost, place = np.zeros((count + 1, self.unknowns)), np.searchsorted(edges, moved, "right")
+        lost, place = np.zeros((count + 1, each.shape[1])), np.searchsorted(edges, moved, "right")
         at, ends = np.minimum(place - 1, count), np.append(edges, edges[-1] + 1)
         late = ((moved - ends[at]) / np.diff(ends)[at])[:, np.newaxis] * each
         np.add.at(lost, at, each - late)
@@ -225,20 +258,20 @@ class Plays:
         along = np.outer(density, self.positions) + correction @ self.rises
         return np.asarray(self.widths[:, np.newaxis] * along)
 
-    def output(self, theta: Array, drive: Array, memory: Array | None) -> Array:
-        """P(u) in V for a drive u (V), both (n,), after what a scanner in use remembers."""
-        start, tables = self.start(drive, memory), self.tables(theta)
+    def output(self, theta: Array, drive: Array, start: Array) -> Array:
+        """P(u) in V for a drive u (V), both (n,), after plays (V) at the ``start``, (plays,)."""
         scale = (len(self.positions) - 1) / (self.upper - self.lower)
-        return _output(drive, self.thresholds, start, tables, self.lower, scale)
+        tables = self.tables(theta)
+        return _output(drive, self.thresholds, start.copy(), tables, self.lower, scale)
 
     def pieces(
-        self, _: Array, drive: Array, edges: Edges, memory: Array | None
+        self, _: Array, drive: Array, edges: Edges, start: Array
     ) -> Iterator[NDArray[np.float32]]:
         """Yield ∂P/∂theta averaged over stretches, in pieces of shape (stretches, parameters).
 
         In single precision: there may be gigabytes of them, and only steps are made of them.
         """
-        both = _moments(drive, self.thresholds, self.start(drive, memory), edges)
+        both = _moments(drive, self.thresholds, start.copy(), edges)
         at_once = self.settings.rows_at_once
         for first in range(0, len(edges) - 1, at_once):
             yield self._columns(*(one[first : first + at_once] for one in both))
@@ -268,8 +301,12 @@ class Plays:
         """Levels of the Everett surface, V."""
         return np.linspace(self.lower, self.upper, self.settings.surface_levels)
 
-    def surface(self, theta: Array, *, mixed: bool = False) -> EverettSurface:
+    def surface(
+        self, theta: Array, bias: float | None = None, *, mixed: bool = False
+    ) -> EverettSurface:
         """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
+
+        Its ``bias`` (V) is that of depolarised rest.
 
         Plays that the range cannot push both ways stay where they have settled. Where the surface
         does not grow, as a fit that has not converged may leave it, it may be ``mixed`` with a
@@ -293,9 +330,8 @@ class Plays:
         share = 0.0
         if mixed:
             values, share = grown(values, levels, self.settings.least_slope)
-        return EverettSurface(
-            self.lower, self.upper, values, offset + share * (self.lower - offset)
-        )
+        offset += share * (self.lower - offset)
+        return EverettSurface(self.lower, self.upper, values, offset, bias)
 
 
 @compiled

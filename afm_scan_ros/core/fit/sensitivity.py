@@ -62,12 +62,13 @@ def pulled(simulation: Simulation, pieces: Iterable[Columns] | None, pull: Array
         through = StretchFilter(bank, 0.0, record.period, record.edges, np.zeros(1))
         inputs, settled = through.pulled(whole)
         if record.rested:
-            result[: parts["map"].stop] += np.outer(by_rest(layout, simulation.theta), settled)
+            known = np.r_[: parts["map"].stop, layout.memory_part(record)]
+            result[known] += np.outer(by_rest(layout, simulation.theta), settled)
         else:
             inputs[0] += settled
         inputs /= simulation.slopes[:, np.newaxis]
         result[parts["map"]] -= simulation.bends.T @ inputs
-        result[layout.memory_part(record)] = simulation.remembered.T @ inputs
+        result[layout.memory_part(record)] += simulation.remembered.T @ inputs
         for columns in pieces:
             part = inputs[first : first + len(columns)]
             result[: columns.shape[1]] += columns.T @ part
@@ -80,7 +81,7 @@ def _of_operator(simulation: Simulation, pieces: Iterable[Columns] | None) -> It
 
     Last come those by the record's memory, which are alone where the operator is held.
     """
-    record, held, bends = simulation.record, pieces is None, simulation.bends
+    record, bends = simulation.record, simulation.bends
     if pieces is None:
         pieces, bends = [np.zeros((len(bends), 0))], bends[:, :0]
     bank, first = simulation.dynamics.parallel(), 0
@@ -91,8 +92,10 @@ def _of_operator(simulation: Simulation, pieces: Iterable[Columns] | None) -> It
         inputs = np.hstack([columns.astype(float), *others])
         inputs /= simulation.slopes[part, np.newaxis]
         if through is None:
-            rest = np.zeros(0) if held else by_rest(simulation.layout, simulation.theta)
-            settled = rest if record.rested else inputs[0]
+            settled = inputs[0]
+            if record.rested:
+                known = by_rest(simulation.layout, simulation.theta)
+                settled = known[len(known) - len(settled) :]
             through = StretchFilter(bank, 0.0, record.period, record.edges, settled)
         else:
             yield through(waiting, inputs[0])

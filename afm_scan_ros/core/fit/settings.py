@@ -63,6 +63,12 @@ class FitSettings:
         "thresholds between which the memory of plays at an unknown start is linear",
         "a turn of the drive leaves a bend at its swing: of several, the largest few count",
     )
+    rest_bias: float = setting(
+        0.1,
+        "1",
+        "most by which the middle of swings of half the range lies off 0 V at rest, over that half",
+        "maps before the hysteresis bend the drive by some per cent at its ends",
+    )
     slope_cells_drive: int = setting(
         8,
         "1",

@@ -59,13 +59,13 @@ class Simulation:
 
     @cached_property
     def remembered(self) -> Array:
-        """∂A/∂memory averaged over stretches, (stretches, unknowns); none for a known start."""
+        """∂A/∂(where the record begins) averaged over stretches, (stretches, unknowns)."""
         layout, record = self.layout, self.record
-        memory = layout.memory_of(self.theta, record)
-        if record.unknown is None or memory is None:
+        start = layout.start_of(self.theta, record)
+        if not start[1].shape[1]:
             return np.zeros((len(record.edges) - 1, 0))
-        given = layout.of_operator(self.theta), record.drive, record.edges, memory
-        return layout.operator.remembered(*given)
+        given = layout.of_operator(self.theta), record.drive, record.edges
+        return layout.operator.remembered(*given, start)
 
     @cached_property
     def vibration(self) -> Array:
@@ -110,8 +110,8 @@ def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
     """
     operator, mapped = layout.of_operator(theta), layout.map_of(theta)
     before = np.zeros(1) if record.rested else record.drive[:1]
-    memory = layout.memory_of(theta, record)
-    raw, rest = (layout.operator.output(operator, one, memory) for one in (record.drive, before))
+    start, _ = layout.start_of(theta, record)
+    raw, rest = (layout.operator.output(operator, one, start) for one in (record.drive, before))
     if mapped is not None:
         raw, rest = mapped.output(raw), mapped.output(rest)
     return Simulation(layout, theta, record, raw, float(rest[0]), layout.dynamics(theta))
@@ -119,18 +119,17 @@ def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:
 
 def at_rest(layout: Layout, theta: Array) -> Array:
     """F (V) at depolarised rest, shape (1,)."""
-    mapped, at = (
-        layout.map_of(theta),
-        layout.operator.output(layout.of_operator(theta), np.zeros(1), None),
-    )
+    start, mapped = layout.at_rest(theta)[0], layout.map_of(theta)
+    at = layout.operator.output(layout.of_operator(theta), np.zeros(1), start)
     return at if mapped is None else mapped.output(at)
 
 
 def by_rest(layout: Layout, theta: Array) -> Array:
-    """Derivatives of F at depolarised rest by the operator and its map."""
+    """Derivatives of F at depolarised rest by the operator, its map, and where that rest is."""
     operator, given, rest = layout.operator, layout.of_operator(theta), np.zeros(1)
-    mapped, at = layout.map_of(theta), at_rest(layout, theta)
-    (columns,) = operator.pieces(given, rest, np.arange(2), None)
+    mapped, at, start = layout.map_of(theta), at_rest(layout, theta), layout.at_rest(theta)
+    (columns,) = operator.pieces(given, rest, np.arange(2), start[0])
     bends = terms(at, operator.lower, operator.upper, operator.bends)
     slope = 1.0 if mapped is None else mapped.slope(at)[0]
-    return np.asarray(np.concatenate([columns[0], -bends[0]]) / slope)
+    moved = operator.remembered(given, rest, np.arange(2), start)
+    return np.asarray(np.concatenate([columns[0], -bends[0], moved[0]]) / slope)

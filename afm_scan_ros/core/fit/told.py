@@ -86,7 +86,7 @@ class Knowledge:
         )
         simulation = simulate(layout, fit.theta, record)
         theta = layout.of_operator(fit.theta)
-        pieces = layout.operator.pieces(theta, drive, edges, layout.memory_of(fit.theta, record))
+        pieces = layout.operator.pieces(theta, drive, edges, layout.start_of(fit.theta, record)[0])
         rows = [one for _, one in jacobian(simulation, pieces)]
         change = np.concatenate(rows)
         change -= change.mean(axis=0)
@@ -147,7 +147,10 @@ def _opening(fit: AxisFit) -> tuple[float, Array]:
     operator, count = fit.layout.operator, fit.layout.settings.direct_levels
     up = np.linspace(operator.lower, operator.upper, 2 * count + 1)
     drive = np.concatenate([up, up[-2::-1]])
-    theta, used = fit.layout.of_operator(fit.theta), np.zeros(operator.unknowns)
+    theta, (used, _) = (
+        fit.layout.of_operator(fit.theta),
+        operator.in_use(drive[0], np.zeros(operator.unknowns)),
+    )
     output = operator.output(theta, drive, used)
     edges = np.arange(len(drive) + 1)
     rows = np.concatenate([*map(np.asarray, operator.pieces(theta, drive, edges, used))])

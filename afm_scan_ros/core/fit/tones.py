@@ -16,24 +16,29 @@ from afm_scan_ros.core.types import Array
 
 
 def find_tones(
-    residual: Array, motion: Array, error: float, period: float, settings: FitSettings
+    residual: Array, drive: Array, motion: Array, period: float, settings: FitSettings
 ) -> list[float]:
-    """Frequencies (Hz) of the sines in a residual, the strongest first.
+    """Frequencies (Hz) of the sines in a residual (m), the strongest first.
 
-    Both are in m, (n,). A line of the model's ``motion`` that is stronger than the residual's is
-    left to the model, whose error it may be. So is a line of what a hysteresis makes of the motion,
-    where an ``error`` of that share of the motion (1) explains it.
+    The ``drive`` is in V, the model's ``motion`` in m, all (n,). A line of the motion that is
+    stronger than the residual's is left to the model, whose error it may be. So is a line of what a
+    hysteresis makes of the motion, where an error as large as the residual explains it, and a line
+    of the drive that leaves little more over the drive than its neighbours: there the model may
+    lack a mode.
     """
     found: list[float] = []
     window = np.hanning(len(residual))
     limit = np.log(len(residual) / settings.tone_chance)
     moved = motion - motion.mean()
+    error = float(np.std(residual) / max(np.std(motion), np.finfo(float).tiny))
     moving = _power(moved, window)
     owned = np.where(_lines(moving, limit, settings), moving, 0.0)
+    left = residual - residual.mean()
+    driven = _power(drive - drive.mean(), window)
+    owned = np.maximum(owned, _shared(driven, _power(left, window), limit, settings))
     for one in _distorted(moved):
         bent = settings.tone_loud * error**2 * _power(one, window)
         owned = np.maximum(owned, np.where(_lines(bent, limit, settings), bent, 0.0))
-    left = residual - residual.mean()
     while len(found) < settings.tone_most:
         power = _power(left, window)
         ratio = np.where(power < owned, 0.0, _over_mean(power))
@@ -74,6 +79,18 @@ def offered_tones(
         left = left - fitted[best]
         found.append(others.pop(best))
     return found
+
+
+def _shared(driven: Array, power: Array, limit: float, settings: FitSettings) -> Array:
+    """Power at lines of the drive that as large a share of it at a neighbouring line explains."""
+    result = np.zeros(len(power))
+    peaks, _ = find_peaks(np.where(_over_mean(driven) > limit, driven, 0.0))
+    shares = power[peaks] / driven[peaks]
+    for k, peak in enumerate(peaks):
+        beside = np.delete(shares[max(k - 1, 0) : k + 2], min(k, 1))
+        near = slice(max(peak - settings.tone_side, 0), peak + settings.tone_side + 1)
+        result[near] = settings.tone_loud * driven[near] * beside.max(initial=0.0)
+    return result
 
 
 def _distorted(motion: Array) -> Iterator[Array]:

@@ -87,7 +87,7 @@ def predicted(fit: AxisFit, drive: Array, period: float) -> PredictedMotion:
     simulation = simulate(fit.layout, fit.theta, record)
     moved = fit.gain * (simulation.output - simulation.output[0])
     theta = fit.layout.of_operator(fit.theta)
-    pieces = operator.pieces(theta, drive, edges, None)
+    pieces = operator.pieces(theta, drive, edges, fit.layout.start_of(fit.theta, record)[0])
     variance, rest = np.empty(count), None
     spread = partial(np.einsum, "ij,jk,ik->i", optimize=True)
     known = covariance(fit)

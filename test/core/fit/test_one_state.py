@@ -13,7 +13,7 @@ def missed_by_best_start(path: Array, output: Array) -> float:
     low, high = (output - path).min(), (output - path).max()
     operator = OneState(-LIMIT, LIMIT, (low - 0.05, high + 0.05))
     starts = operator.started([(path, output)])
-    return min(float(np.std(operator.output(s, path, None) - output)) for s in starts)
+    return min(float(np.std(operator.output(s, path, np.zeros(2)) - output)) for s in starts)
 
 
 @pytest.mark.parametrize("family", ["duhem", "bouc_wen"])
@@ -36,9 +36,9 @@ def test_slopes_stay_the_same_on_cells_that_reach_further() -> None:
     output = applied(OPERATORS["duhem"], path)
     operator = OneState(-LIMIT, LIMIT, (-0.3, 0.3))
     theta = operator.started([(path, output)])[5]
-    before = operator.output(theta, path, None)
+    before = operator.output(theta, path, np.zeros(2))
     wider, moved = operator.covering(theta, np.array([-0.36, 0.4]))
-    apart = wider.output(moved, path, None) - before
+    apart = wider.output(moved, path, np.zeros(2)) - before
     assert np.std(apart) < 2e-3 * np.ptp(before)
     assert wider.widths[0] < -0.36
     assert wider.widths[1] > 0.4

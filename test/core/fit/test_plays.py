@@ -16,6 +16,10 @@ from afm_scan_ros.core.types import Array
 from helpers.fit_cases import GAIN, LIMIT, SETTINGS, levels, of_plays_alone
 
 
+def rest(bank: PlayBank, value: float = 0.0) -> Array:
+    return bank.at_rest(np.array([value]))[0]
+
+
 @pytest.fixture(scope="module")
 def drive() -> Array:
     return levels(1, 14, 600)
@@ -27,12 +31,12 @@ def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     plays, terms = bank.parts["density"], bank.parts["correction"]
     density = np.concatenate([[0.8], 0.3 * rng.random(plays - 1)])
     theta = np.concatenate([density, 0.02 * rng.standard_normal(terms)])
-    surface = bank.surface(theta)
-    model = Preisach(surface)
+    value = 0.1
+    bias, _ = bank.bias(np.array([value]))
+    model = Preisach(bank.surface(theta, bias))
     of_model = model.apply(model.at_rest(), drive)[1]
-    of_plays = bank.output(theta, drive, None)
-    apart = of_model - (of_plays - bank.output(theta, np.zeros(1), None))
-    assert np.abs(apart).max() < 3e-4 * np.ptp(of_plays)
+    of_plays = bank.output(theta, drive, rest(bank, value))
+    assert np.ptp(of_model - of_plays) < 3e-4 * np.ptp(of_plays)
 
 
 @given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.0, 0.1, 3.0]))
@@ -43,12 +47,13 @@ def test_each_play_moves_as_it_would_alone(seed: int, spread: float) -> None:
     path, memory = levels(seed, 6, 60), spread * rng.standard_normal(bank.unknowns)
     theta = bank.unbent()
     theta[: bank.parts["density"]] = rng.normal(size=bank.parts["density"])
-    plays, tables, expected = bank.start(path, memory), bank.tables(theta), []
+    start, tables, expected = bank.in_use(path[0], memory)[0], bank.tables(theta), []
+    plays = start.copy()
     for volts in path:
         plays = np.minimum(volts + bank.thresholds, np.maximum(volts - bank.thresholds, plays))
         each = zip(plays, tables, strict=True)
         expected.append(sum(np.interp(play, bank.positions, table) for play, table in each))
-    np.testing.assert_allclose(bank.output(theta, path, memory), expected, atol=1e-9)
+    np.testing.assert_allclose(bank.output(theta, path, start), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 5.0), (-1.0, 4.0), (-3.0, 3.0)])
@@ -61,7 +66,7 @@ def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float
     model = Preisach(surface)
     assert model.at_rest().now[1] == pytest.approx(0.0, abs=1e-12)
     path = np.interp(np.arange(700), np.arange(0, 701, 100), [0, high, low, high, 1, 3, 0.5, 2])
-    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, None)
+    apart = model.apply(model.at_rest(), path)[1] - bank.output(theta, path, rest(bank))
     assert np.ptp(apart[200:]) < 1e-3 * (high - low)
 
 
@@ -97,7 +102,7 @@ def test_plays_that_no_surface_has_are_held_to_one() -> None:
     theta[12:20] = -12.0
     with pytest.raises(InputError, match="does not grow"):
         operator.surface(theta)
-    moved = GAIN * operator.output(theta, drive, None)
+    moved = GAIN * operator.output(theta, drive, rest(operator))
     fit = AxisFit(*of_plays_alone(drive, moved))
     settle(fit, 20, ("density", "correction"))
     with pytest.raises(InputError, match="does not grow"):

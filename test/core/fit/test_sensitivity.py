@@ -48,6 +48,7 @@ def at_some_theta(kind: str, sensor_order: int = 0) -> tuple[Layout, Array, np.r
             theta[layout.parts[name]] += size * rng.standard_normal(theta[layout.parts[name]].size)
     theta[layout.parts["creep"]] = 0.02 * rng.random(theta[layout.parts["creep"]].size)
     theta[layout.parts["sensor"]] = np.log(3.0 * FREQUENCY)
+    theta[layout.parts["rest"]] = 0.3
     memory = 0.4 * operator.expected_memory() * rng.uniform(-1.0, 1.0, operator.unknowns)
     return evolve(layout, unknown_starts=1), np.concatenate([theta, memory]), rng
 
@@ -64,11 +65,11 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, sta
     drive = drive if rested else drive + 0.3
     one, operator = signals(drive, 1e-6 * drive, block), layout.operator
     one = evolve(one, rested=rested, unknown=unknown)
-    memory = layout.memory_of(theta, one)
-    pieces = operator.pieces(layout.of_operator(theta), drive, one.edges, memory)
+    begun, _ = layout.start_of(theta, one)
+    pieces = operator.pieces(layout.of_operator(theta), drive, one.edges, begun)
     of_pieces = jacobian(simulate(layout, theta, one), pieces)
     found = np.concatenate([piece for _, piece in of_pieces])
-    known = layout.size - operator.unknowns
+    known = layout.parts["sensor"].stop
     remembered = np.arange(layout.parts["creep"].stop, layout.size)
     for place in [*rng.choice(known, 60, replace=False), *remembered]:
         step = 1e-5 * np.eye(layout.size)[place]
@@ -90,7 +91,7 @@ def test_residuals_are_pulled_back_by_the_same_jacobian(
     one = evolve(one, edges=np.unique([*one.edges[::3], one.edges[-1]]))
     at = simulate(layout, theta, one)
     given = layout.of_operator(theta), drive, one.edges
-    pieces = list(layout.operator.pieces(*given, layout.memory_of(theta, one)))
+    pieces = list(layout.operator.pieces(*given, layout.start_of(theta, one)[0]))
     whole = np.concatenate([piece for _, piece in jacobian(at, pieces)])
     pull = rng.standard_normal((len(whole), 2))
     expected = whole.T @ pull
@@ -122,10 +123,10 @@ def test_sensitivities_of_one_state_are_those_of_its_steps(block: int) -> None:
     operator, path = OneState(-LIMIT, LIMIT, (-0.2, 0.2)), levels(3, 20, 200)
     theta = 2.0 * rng.random(operator.parts["slopes"]) - 0.5
     edges = np.cumsum([0, *np.tile([block, 3 * block], len(path) // (4 * block))])
-    found = np.concatenate(list(operator.pieces(theta, path, edges, None)))
+    found = np.concatenate(list(operator.pieces(theta, path, edges, np.zeros(2))))
     for place in rng.choice(theta.size, 40, replace=False):
         step = 1e-6 * np.eye(theta.size)[place]
-        up, down = (operator.output(theta + way * step, path, None) for way in (1.0, -1.0))
+        up, down = (operator.output(theta + way * step, path, np.zeros(2)) for way in (1.0, -1.0))
         slope = means(up - down, edges) / 2e-6
         np.testing.assert_allclose(found[:, place], slope, atol=1e-3 * np.abs(slope).max() + 1e-7)
 

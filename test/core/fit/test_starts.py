@@ -6,7 +6,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.starts import begun_at_rest, counted_from_rest
+from afm_scan_ros.core.fit.starts import begun_at_rest
 from helpers.fit_cases import GAIN, displaced, levels, of_plays, of_plays_alone, record
 
 
@@ -26,14 +26,15 @@ def test_the_others_keep_what_they_remember() -> None:
     assert [one.rested for one in found.records] == [False, True, False]
     assert found.layout.size == fit.layout.size - fit.layout.operator.unknowns
     for k in (0, 2):
-        before = fit.layout.memory_of(fit.theta, fit.records[k])
-        after = found.layout.memory_of(found.theta, found.records[k])
+        before, _ = fit.layout.start_of(fit.theta, fit.records[k])
+        after, _ = found.layout.start_of(found.theta, found.records[k])
         np.testing.assert_array_equal(after, before)
-    assert found.layout.memory_of(found.theta, found.records[1]) is None
+    rested, _ = found.layout.start_of(found.theta, found.records[1])
+    np.testing.assert_array_equal(rested, found.layout.at_rest(found.theta)[0])
 
 
 def test_a_record_counts_from_rest_on() -> None:
-    found = counted_from_rest(begun_at_rest(three_unknown_starts(), [0, 2]))
+    found = begun_at_rest(three_unknown_starts(), [0, 2])
     assert [one.first for one in found.records] == [0, 100, 0]
 
 

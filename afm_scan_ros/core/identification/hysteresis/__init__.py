@@ -1,1 +1,0 @@
-"""Reversal curves, or loops of any kind → a Preisach model of them."""

@@ -1,1 +1,0 @@
-"""Waves, chirps and steps of a drive → the frequency response, and the model behind it."""
