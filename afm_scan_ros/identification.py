@@ -6,17 +6,12 @@ from attrs import evolve
 
 from afm_scan_ros.core.arguments import RECORDS, all_of_type, whole
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.alternating import Sizes
-from afm_scan_ros.core.identification.drives.excitation import PLANS
-from afm_scan_ros.core.identification.drives.experiments import SWEEPS
-from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
 from afm_scan_ros.core.identification.identify import identify_records
 from afm_scan_ros.core.identification.state_space.identify import (
     CoupledSetting,
     coupling_is_seen,
     identify_coupled,
 )
-from afm_scan_ros.core.identification.vibration.rational_fit import Order
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, ProgressCallback
 from afm_scan_ros.model import Model
@@ -64,9 +59,6 @@ def identify(
     records: Iterable[Record],
     progress: ProgressCallback | None = None,
     *,
-    levels: int = LEVELS,
-    order: tuple[int, int] | None = None,
-    delay: bool = False,
     effects: Iterable[str] = (),
     states: int | None = None,
 ) -> Model:
@@ -75,18 +67,10 @@ def identify(
     Parameters
     ----------
     records
-        What each is for is recognised from its drive where no kind is stated: "creep" for steps,
-        "frequency" for multisines and sweeps, "hysteresis" for reversal curves. All others are
-        ordinary motion, as scans and loops are. One of the kind "validation" fits nothing: the
-        model's error is measured on it, and ``diagnose`` needs that error.
+        None needs a kind. Those of the kind "validation" fit nothing: the model's error is measured
+        on them, and ``diagnose`` needs that error.
     progress
         Is called with what is being fitted.
-    levels
-        Levels of the Everett surfaces along either side, 3 or more.
-    order
-        Poles and zeros of the vibration model; None lets the record choose.
-    delay
-        Whether the vibration takes the record's delay for its own.
     effects
         Of coupled axes, what acts in their feedback, of "amplitude_softening" and "maxwell_slip":
         identified with the vibration, best from records of several amplitudes.
@@ -102,16 +86,14 @@ def identify(
     Raises
     ------
     InputError
-        Where a record cannot show what it is for, and for arguments out of range.
+        Where a record shows nothing or is of another scanner than the others, and for arguments out
+        of range.
     ScanError
-        Where a fit does not converge.
+        Where a fit diverges.
 
     Notes
     -----
-    An axis with one each of creep, frequency and hysteresis is identified from these three, as if
-    they began depolarised, at rest at zero, where that leaves less than 0.1 % of the motion of any
-    record. Its further records are then held out and give the model's error. All other records are
-    fitted together.
+    All records of an axis are fitted at once, whatever their kinds and their order.
 
     Records of more than two axes are of coupled ones: of a multisine that drives all of them, each
     of another realisation, in steady state for two periods or more. So are such records of two
@@ -132,34 +114,21 @@ def identify(
     given = list(all_of_type(Record, "records", records, RECORDS))
     effects = all_of_type(str, "effects", effects, "names of effects, as ['maxwell_slip']")
     states = None if states is None else whole("states", states, 2)
-    sizes = Sizes(whole("levels", levels, 3), _order_of(order), delay)
     report = progress or (lambda _: None)
     if not given:
         raise InputError("no record is given: give one at least")
     several = any(len(record.axes) > len(AXES) for record in given)
     if several or effects or states is not None or of_coupled_axes(given):
         return identify_coupled_axes(given, effects, states, report)
-    taken = [_given(record) for record in named(given)]
-    found = identify_records(taken, sizes, report)
+    taken = [_whole(record) for record in named(given)]
+    found = identify_records(taken, report)
     names = ", ".join(each.name for each in taken)
     return Model(found.model, f"identified from {names}", found)
 
 
-def _order_of(given: tuple[int, int] | None) -> Order | None:
-    if given is None:
-        return None
-    try:
-        poles, zeros = given
-    except (TypeError, ValueError):
-        raise InputError(f"order is {given!r}: give poles and zeros, as (4, 3)") from None
-    return Order(whole("order, poles", poles, 1), whole("order, zeros", zeros, 0))
-
-
-def _given(record: Record) -> Record:
-    """Return a record that is named by what it is to be used for; raises InputError for a part."""
+def _whole(record: Record) -> Record:
+    """Return a record, its shortcomings logged; raises InputError for a part."""
     if record.missing:
         raise InputError("; ".join((*record.shortcomings, "record it again")))
     record.warn()
-    kind = "frequency" if record.kind in SWEEPS else record.kind
-    kind = kind if kind in PLANS else None
-    return evolve(record, name=f"{kind} in {record.name}" if kind else record.name, kind=kind)
+    return record

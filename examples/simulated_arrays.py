@@ -19,7 +19,7 @@ config = share_directory() / "config"
 plans = {
     "creep": excitation.creep_plan(holds=(300.0, 120.0)),
     "frequency": excitation.frequency_plan(),
-    "hysteresis": excitation.hysteresis_plan(levels=21),
+    "hysteresis": excitation.hysteresis_plan(),
     "validation": excitation.validation_plan(),
 }
 drives = {n: excitation.excitation_block(p, 0, p.total_samples) for n, p in plans.items()}

@@ -185,9 +185,9 @@ class RecordedSession:
         return path
 
 
-ORDER = ("resonance", "creep", "hysteresis", "vibration", "error")
+ORDER = ("resonance", "creep", "hysteresis", "error")
 """What records identify, in the order in which they are taken: the gain is known early."""
-RECORDS = ("survey", "creep", "hysteresis", "frequency", "validation")
+RECORDS = ("survey", "creep", "hysteresis", "validation")
 TRIALS = "trials"
 """Folder of the bags of small drives."""
 ROUNDING = 1e-6
@@ -208,7 +208,7 @@ class PlannedCalibration:
     limits: DriveLimits | None
     motion: MotionLimits
     scan_range: float
-    hold: float
+    hold: float | None
     have: proposal.Coverage
     _rows: list[Row] = field(factory=list, init=False)
 

@@ -1,7 +1,6 @@
 """``afm-scan identify``: a model of the scanner from its records."""
 
 import json
-from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -19,17 +18,16 @@ from afm_scan_ros.cli.options import (
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import SWEEPS
-from afm_scan_ros.core.identification.hysteresis.everett_fit import LEVELS
-from afm_scan_ros.core.identification.identify import AxisIdentification, Identification
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis
+from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.identification.together import FittedAxis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import Model
 from afm_scan_ros.report.effect_status_text import status_text, unknown_effects
 from afm_scan_ros.report.fit_page import fit_page
-from afm_scan_ros.report.fit_summary import finding_text, fit_summary, inverse_text, operator_text
+from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.terminal import say
 
 TABLES = TableOptions()
@@ -48,19 +46,6 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 )
 @record_options
 @click.option(
-    "--order",
-    type=(click.IntRange(min=1), click.IntRange(min=0)),
-    metavar="POLES ZEROS",
-    help="Order of the vibration model. By default the record chooses it.",
-)
-@click.option(
-    "--levels",
-    type=click.IntRange(min=3),
-    default=LEVELS,
-    show_default=True,
-    help="Levels of the Everett surfaces along each side.",
-)
-@click.option(
     "--effect",
     "effects",
     type=click.Choice([effect.name for effect in FEEDBACK_EFFECTS]),
@@ -77,7 +62,6 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     is_flag=True,
     help="Every RECORD begins depolarised. By default its initial hysteresis state is estimated.",
 )
-@click.option("--delay", is_flag=True, help="Include the record's delay in the vibration model.")
 @click.option(
     "--out",
     type=NEW_FILE,
@@ -86,22 +70,19 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
     " Records of one axis give a model of that axis.",
 )
-def identify(  # noqa: PLR0913 - click hands over one parameter an option
+def identify(
     records: tuple[Path, ...],
-    order: tuple[int, int] | None,
-    levels: int,
     effects: tuple[str, ...],
     states: int | None,
     out: Path,
     tables: TableOptions,
     *,
-    delay: bool,
     depolarised: bool,
     **bags: Path | None,
 ) -> None:
     """Identify a model from RECORDs of any kinds, and report how well it fits.
 
-    What each record is for is recognised from its drive. An option only states what one is.
+    All are fitted at once. An option only names a record; --validation keeps one out of the fit.
     """
     written = (out.suffix, ".npz", ".fit.json", ".fit.html")
     refuse_existing(*map(out.with_suffix, written), other="file")
@@ -112,9 +93,7 @@ def identify(  # noqa: PLR0913 - click hands over one parameter an option
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
-        model = api.identify(
-            given, progress, levels=levels, order=order, delay=delay, effects=effects, states=states
-        )
+        model = api.identify(given, progress, effects=effects, states=states)
     if model.is_coupled:
         _write_coupled(model, out)
         return
@@ -156,46 +135,26 @@ def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Re
 
 
 def _show(found: Identification) -> None:
-    for axis, fitted in found.together.items():
-        _show_together(axis, fitted)
-    for axis, identified in found.axes.items():
-        _show_axis(axis, identified)
+    for axis, fitted in found.axes.items():
+        _show_axis(axis, fitted)
 
 
-def _show_together(axis: str, found: FittedAxis) -> None:
+def _show_axis(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
         say(f"{axis}: {effect}: {status_text(status)}")
     say(
         f"   hysteresis by {found.operator}; a scan is predicted to {found.deviation:.2%} of its"
         " range (standard deviation)"
     )
-    for record, left in found.left.items():
-        say(f"   {record}: {1e9 * left:.3g} nm rms left")
-    _warn((*unknown_effects({axis: found.model.effects}), *map(finding_text, found.warnings)))
-
-
-def _show_axis(axis: str, found: AxisIdentification) -> None:
-    report = found.report
-    creep, fit = report.creep, report.vibration
-    say(f"{axis}: creep, {creep.order} elements: {_text(creep.held_out, 1e9, 'nm')}")
-    say(
-        f"   vibration, {fit.order}: {fit.resonance:.2f} Hz, damping {fit.damping:.5f},"
-        f" model minus response {fit.misfit:.2%} rms"
-    )
-    if report.operator is not None:
-        say(f"   hysteresis, {operator_text(report.operator)}")
-    for name, error in (("exact", report.exact), ("direct", report.direct)):
-        if error is not None:
-            inverse = inverse_text(name, found.model.hysteresis)
-            text = _text(error, 1e3, "mV")
-            say(f"   hysteresis, held-out loops, {inverse}: {text}")
-    _warn(map(finding_text, report.warnings))
-
-
-def _warn(sentences: Iterable[str]) -> None:
-    for sentence in sentences:
+    for record in found.records:
+        say(f"   {record.name}, left by the model: {_text(record.misfit, 1e9, 'nm')}")
+    for one in found.validations:
+        say(f"   {one.record}, held out: {_text(one.misfit, 1e9, 'nm')}")
+    say(f"   direct inverse of the hysteresis: {_text(found.direct, 1e3, 'mV')}")
+    warnings = map(finding_text, found.warnings)
+    for sentence in (*unknown_effects({axis: found.model.effects}), *warnings):
         say(f"   warning: {sentence}", err=True)
 
 
 def _text(misfit: Misfit, scale: float, unit: str) -> str:
-    return f"sigma {scale * misfit.sigma:.1f} {unit}, max {scale * misfit.maximum:.1f} {unit}"
+    return f"sigma {scale * misfit.sigma:.3g} {unit}, max {scale * misfit.maximum:.3g} {unit}"

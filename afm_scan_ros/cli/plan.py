@@ -38,8 +38,8 @@ def covered(record: Path) -> proposal.Coverage:
     """Return what a record shows, all its axes together."""
     found = read_record(record)
     pairs = zip(found.drive.T, found.displacement.T, strict=True)
-    return proposal.combined(
-        proposal.coverage(drive, moved, found.sample_period) for drive, moved in pairs
+    return proposal.of_axes(
+        [proposal.coverage(drive, moved, found.sample_period) for drive, moved in pairs]
     )
 
 
@@ -51,7 +51,7 @@ class PlanOptions:
     limit: float | None
     lowest: float | None
     rate: float | None
-    hold: float
+    hold: float | None
     have: tuple[Path, ...]
 
     @property
@@ -114,9 +114,8 @@ plan_options = grouped(
     click.option(
         "--hold",
         type=positive("s"),
-        default="5min",
-        show_default=True,
-        help="Hold of the creep record: it identifies time constants up to 0.57 times as long.",
+        help="Add a creep record of such a hold, for time constants up to 0.57 times as long. By"
+        " default creep is identified from the other records alone, up to some seconds.",
     ),
     click.option(
         "--have",
@@ -154,7 +153,7 @@ def plan(wanted: PlanOptions, axis: tuple[str, ...], folder: Path | None) -> Non
     if held.resonance is None:
         say(
             "The resonance is unknown. Take the survey first, then run this command again with"
-            " --have: it adds the frequency record and the validation record."
+            " --have: it adds the records of moves between levels, to fit and to hold out."
         )
     if folder is not None:
         export(folder, plans, axis or AXES)

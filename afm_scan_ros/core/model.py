@@ -205,8 +205,8 @@ class HysteresisModel:
     """``forward``: from drive u (V) to effective input F (V); ``direct``: from F to u.
 
     ``output`` is the map behind a Preisach operator ``forward``, where there is one; a Duhem
-    operator contains its maps. ``inverse`` is the one that was
-    better on held-out loops: the exact inverse of the two, or the direct surface.
+    operator contains its maps. ``inverse`` names the one that compensates: the exact inverse of the
+    two, or the direct surface, which is the paper's.
     """
 
     forward: HysteresisOperator

@@ -56,7 +56,7 @@ class Record:
         of hysteresis and creep are of "x" and "y".
     kind
         What the record was made for: "creep", "frequency", "hysteresis", "validation", or an
-        experiment of ``afm-scan calibrate``. None where that is to be recognised.
+        experiment of ``afm-scan calibrate``. None where that is not stated.
     start
         "depolarised" where the scanner's hysteresis is known to begin so; "unknown" has
         ``diagnose`` estimate its initial state.

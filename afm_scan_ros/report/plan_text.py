@@ -40,8 +40,7 @@ def _row(record: ProposedRecord) -> Row:
 def _identifies(record: ProposedRecord) -> str:
     words = {
         "resonance": f"the resonance, up to {record.covers:.7g} Hz",
-        "vibration": f"vibration up to {record.covers:.7g} Hz",
-        "hysteresis": f"hysteresis over {record.covers:.4g} V",
+        "hysteresis": f"hysteresis and vibration over {record.covers:.4g} V",
         "creep": f"creep with time constants up to {record.covers:.3g} s",
         "error": f"the model's error, on fresh moves over {record.covers:.4g} V",
     }

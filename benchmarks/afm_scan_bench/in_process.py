@@ -1,5 +1,7 @@
 """Calibration within one process: the simulated scanner driven without nodes."""
 
+from attrs import evolve
+
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import checked
@@ -10,7 +12,8 @@ from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, Record]:
     """Drive a scanner fresh from rest through each plan; the records by the plans' names."""
-    return {name: record(plan(), plant, seed) for name, plan in PLANS.items()}
+    plans = {name: plan() for name, plan in PLANS.items()}
+    return {name: evolve(record(plan, plant, seed), kind=name) for name, plan in plans.items()}
 
 
 def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
@@ -18,7 +21,8 @@ def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
     """
-    return checked(Record.of_traces(plan.name, *drive_through(plan, plant, seed)))
+    drive, measured = drive_through(plan, plant, seed)
+    return checked(Record.of_traces(plan.name, drive, measured, start="depolarised"))
 
 
 def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:

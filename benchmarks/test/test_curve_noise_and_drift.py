@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from afm_scan_bench.measured.curve_noise import curve_noise
 from afm_scan_bench.measured.drift_points import freed_of_drift
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
+from afm_scan_bench.measured.reversal_curve import ReversalCurve
 
 
 @settings(max_examples=20, deadline=None)

@@ -176,13 +176,6 @@ def test_a_record_of_another_kind(refused: Refused, tmp_path: Path) -> None:
     assert "give one of kind 'creep'" in refused(bag)
 
 
-def test_records_too_short_or_of_the_wrong_drive(refused: Refused, tmp_path: Path) -> None:
-    creep, frequency, hysteresis = (write(tmp_path / kind, GOOD, kind) for kind in KINDS)
-    message = refused(creep, frequency, hysteresis)
-    assert f"{creep}, a creep record: the drive holds still" in message
-    assert "needed" in message
-
-
 def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
     limited = spoilt(
         "achieved_displacement",

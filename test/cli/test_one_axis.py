@@ -11,19 +11,15 @@ from click.testing import CliRunner
 from afm_scan_ros import identification as api
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.cli.import_csv import import_csv
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.excitation import hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.model import Model, load_model
-from helpers.in_process import default_plant, record, scan
-from helpers.small_records import bag, creep, frequency
+from helpers.in_process import default_plant, record
+from helpers.small_records import bag, creep, frequency, levels
 
-PLANS = creep(), frequency(), hysteresis_plan(levels=7)
+PLANS = creep(), frequency(), Plan("hysteresis", *map(levels, (8, 9)))
 RESONANCE = 453.9363  # Hz, of the least damped root of Eq. 5
-LEVELS = 13
-"""Two to each curve of the record."""
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +44,7 @@ def imported(folder: Path, made: Record, axis: str) -> str:
 def same_as_from_arrays(model: Model, records: list[Record], path: Path) -> None:
     """See that arrays give the same model bit for bit, although no kind is stated."""
     given = [evolve(each.axis("y"), name="") for each in records]
-    api.identify(given, levels=LEVELS).save(path)
+    api.identify(given).save(path)
     found, known = (each.scanner.axis("y") for each in (load_model(path), model))
     assert model.axes == ("y",)
     assert found == evolve(known, hysteresis=found.hysteresis)
@@ -62,7 +58,7 @@ def test_one_axis_gives_its_report_and_its_model(records: list[Record], tmp_path
     bags = {made.name: imported(tmp_path, made, "y") for made in records}
     out = tmp_path / "model.yaml"
     words = [word for name, path in bags.items() for word in (f"--{name}", path)]
-    words += ["--levels", str(LEVELS), "--out", str(out)]
+    words += ["--out", str(out)]
     result = CliRunner().invoke(identify, words, catch_exceptions=False)
     assert result.exit_code == 0
     assert f"Wrote {out} of y alone" in result.output
@@ -103,21 +99,3 @@ def test_each_axis_is_identified_from_whatever_there_is_of_it(
     assert "All records were fitted" in result.output
     report = json.loads(out.with_suffix(".fit.json").read_text("utf-8"))
     assert 0.0 < report["x"]["scan_deviation_over_range"] < 0.01
-
-
-def test_sizes_of_the_identification_in_turns_are_refused_elsewhere(records: list[Record]) -> None:
-    with pytest.raises(InputError, match=r"y: levels, order and delay are of .*: leave them out"):
-        api.identify([records[1].axis("y")], levels=LEVELS)
-
-
-@pytest.mark.evidence
-def test_what_is_given_beyond_one_of_each_kind_is_held_out_and_gives_the_error(
-    records: list[Record],
-) -> None:
-    given = [evolve(each.axis("y"), name="") for each in records]
-    spec = ScanSpec(range_y=10e-6, range_x=10e-6, lines=4)
-    healthy = scan(spec, ())
-    more = Record(healthy.drive.y, healthy.measured.y, spec.sample_period, ("y",), name="healthy")
-    model = api.identify([*given, more], levels=LEVELS)
-    assert model.scanner.axis("y") == api.identify(given, levels=LEVELS).scanner.axis("y")
-    assert model.scanner.axis("y").known_elsewhere[-1].record.startswith("healthy")

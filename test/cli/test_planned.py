@@ -25,7 +25,7 @@ SMALL = ["--range", "40um", "--rate", "2.5kHz", "--hold", "10s"]
 """Of the default plant, sampled as slowly as its resonance allows."""
 MODEL = ["--model", str(share_directory() / "config/model.yaml")]
 SETTINGS = """\
-amplifier: {voltage_limit_v: 3.0, slew_limit_v_per_s: 100.0, ramp_down_slew_v_per_s: 40.0}
+amplifier: {voltage_limit_v: 3.0, slew_limit_v_per_s: 20.0, ramp_down_slew_v_per_s: 20.0}
 x: {sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}
 y: {sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}
 latency_samples: 0
@@ -114,11 +114,11 @@ def test_the_limits_of_a_driver_s_settings_hold(tmp_path: Path) -> None:
     words = ["--scanner", driver, *SMALL, "--out"]
     done = calibrate(scanner, *words, str(tmp_path / "out"))
     assert "survey: planned with" in done.output
-    assert "beyond the amplifier's 100 V/s" in done.output
+    assert "beyond the amplifier's 20 V/s" in done.output
     (plan,) = scanner.plans
     for wave in (plan.x, plan.y):
         assert 16.0 * np.abs(whole(wave)).max() <= 3.0
-        assert 16.0 * np.abs(np.diff(whole(wave))).max() / plan.sample_period <= 100.0
+        assert 16.0 * np.abs(np.diff(whole(wave))).max() / plan.sample_period <= 20.0
     refused = calibrate(scanner, *words, str(tmp_path / "no"), "--limit", "4V")
     assert isinstance(refused.exception, InputError)
     assert "beyond the scanner's limit of 3 V" in str(refused.exception)

@@ -28,6 +28,17 @@ def frequency() -> Plan[Multisine]:
     return Plan("frequency", multisines, multisines)
 
 
+def levels(seed: int) -> Waypoints:
+    """Sixty moves between random levels, 10 to 2000 V/s, sampled at 20 kHz."""
+    rng = np.random.default_rng(seed)
+    path = np.concatenate([[0.0, 0.0], 3.6 * rng.uniform(-1.0, 1.0, 60), [0.0, 0.0]])
+    speeds = np.geomspace(10.0, 2000.0, 61)
+    moves = np.abs(np.diff(path[1:-1])) / speeds + 1e-3
+    seconds = np.concatenate([[0.1], moves, [0.1]])
+    samples = np.concatenate([[0.0], np.cumsum(np.rint(2e4 * seconds))])
+    return Waypoints(5e-5, path, samples, blend=20.0)
+
+
 def bag(folder: Path, made: Record) -> Path:
     drive, displacement = made.traces()
     info = ScanInfo("s", 0, made.name, drive.sample_period, len(drive.x))

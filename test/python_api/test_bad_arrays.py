@@ -152,18 +152,6 @@ BAD_CALLS: dict[str, tuple[Callable[[afm.Model], object], str]] = {
         lambda m: afm.diagnose(m, [record()], longest=-1.0),
         "longest is -1.0: give a positive number, in s",
     ),
-    "few levels": (
-        lambda _: afm.identify([record()], levels=2),
-        "levels is 2: give a whole number, 3 or more",
-    ),
-    "one number as an order": (
-        lambda _: afm.identify([record()], order=4),  # type: ignore[arg-type] # as above
-        r"order is 4: give poles and zeros, as \(4, 3\)",
-    ),
-    "no poles": (
-        lambda _: afm.identify([record()], order=(0, 0)),
-        "order, poles is 0: give a whole number, 1 or more",
-    ),
     "no states": (
         lambda _: afm.identify([record()], states=0),
         "states is 0: give a whole number, 2 or more",
@@ -296,11 +284,7 @@ def too_far() -> object:
     return afm.load_model().predict(np.full((50, 2), 1e3), 1e-4)
 
 
-def one_number() -> object:
-    return afm.identify([record()], order=4)  # type: ignore[arg-type] # what is refused
-
-
-@pytest.mark.parametrize("call", [missing, too_far, one_number])
+@pytest.mark.parametrize("call", [missing, too_far])
 def test_no_inner_error_stands_before_what_is_reported(call: Callable[[], object]) -> None:
     """The message names all that an inner error knows, so a traceback shows it alone."""
     with pytest.raises(afm.InputError) as refused:

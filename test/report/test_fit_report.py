@@ -1,4 +1,4 @@
-"""The fit report states of each effect what was fitted on what, how well, and what to beware of."""
+"""The fit report states of each axis what was fitted, how well, and what to beware of."""
 
 import json
 
@@ -7,34 +7,21 @@ import pytest
 from attrs import evolve
 from markupsafe import escape
 
-from afm_scan_ros.core.identification.alternating import Sizes
-from afm_scan_ros.core.identification.drives.excitation import Plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.waveforms import Waypoints
-from afm_scan_ros.core.identification.findings import UndeterminedCreepElement
-from afm_scan_ros.core.identification.identify import (
-    Identification,
-    identify_records,
-)
+from afm_scan_ros.core.identification.findings import UncertainScan
+from afm_scan_ros.core.identification.identify import Identification, identify_records
+from afm_scan_ros.report.fit_figures import response_figure
 from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
-from helpers.in_process import default_plant, record
-from helpers.small_records import frequency
-
-pytestmark = pytest.mark.evidence
-
-
-def short_creep() -> Plan[Waypoints]:
-    """Holds of 300 and 60 s, which cannot identify y's element of 1700 s."""
-    samples = 100.0 * np.array([0.0, 2.0, 2.1, 302.1, 302.2, 362.2, 364.0])
-    steps = Waypoints(0.01, np.array([0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 0.0]), samples, 5.0)
-    return Plan("creep", steps, steps)
+from helpers.fit_cases import FREQUENCY, GAIN, OPERATORS, levels, record
 
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    plans = short_creep(), frequency(), hysteresis_plan(levels=7)
-    made = [evolve(record(plan, default_plant(), seed=1), kind=plan.name) for plan in plans]
-    return identify_records(made, Sizes(levels=13))
+    fitted = record(OPERATORS["plays"], levels(1, 14, 600))
+    held_out = evolve(
+        record(OPERATORS["plays"], levels(2, 8, 500)), name="check", kind="validation"
+    )
+    return identify_records([fitted, held_out])
 
 
 @pytest.fixture(scope="module")
@@ -42,58 +29,47 @@ def page(found: Identification) -> str:
     return fit_page(found)
 
 
-def test_numbers_are_json_and_open_intervals_null(found: Identification) -> None:
+def test_figures_of_merit_are_those_of_the_residuals(found: Identification) -> None:
     summary = json.loads(json.dumps(fit_summary(found), allow_nan=False))
-    for axis in ("x", "y"):
-        effects = summary[axis]
-        assert all(effects[name]["record"] for name in ("creep", "vibration", "hysteresis"))
-        low, high = effects["vibration"]["resonance_interval_hz"]
-        assert low < effects["vibration"]["resonance_hz"] < high
-        assert effects["creep"]["held_out"]["sigma_m"] > 0.0
-        assert effects["hysteresis"]["exact_inverse_held_out"]["samples"] > 1000
-        assert effects["model_discrepancy"]["record"].startswith("hysteresis, the loops after")
+    (axis,) = found.axes.values()
+    for name, residual in (
+        ("records", axis.records[0].left),
+        ("held_out", axis.validations[0].residual),
+    ):
+        (figures,) = summary["x"][name].values()
+        assert figures["sigma_m"] == pytest.approx(np.std(residual), rel=0.01)
+        assert figures["max_m"] == np.abs(residual).max()
+        assert figures["samples"] == len(residual)
+    assert 0.0 < summary["x"]["direct_inverse"]["sigma_v"] < 0.05
+    assert summary["x"]["effects"]["hysteresis"]["status"] == "identified"
+    assert summary["x"]["model_discrepancy"][0]["record"].startswith("check:")
 
 
-def test_what_intervals_span_and_what_they_leave_out_is_reported(
-    found: Identification, page: str
-) -> None:
-    summary = fit_summary(found)
-    for axis in ("x", "y"):
-        vibration = summary[axis]["vibration"]
-        low, high = vibration["gain_interval"]
-        others = vibration["intervals_span"]
-        orders, levels = (
-            sorted(n for n in others if ("poles" in n) is has) for has in (True, False)
-        )
-        assert (len(orders), len(levels)) == (2, 1)
-        assert f"{orders[0]}, {levels[0]}" == orders[1]
-        assert all(low < other["gain_over_reference"] < high for other in others.values())
-        assert all(f"{axis}, {name}" in page for name in others)
-    assert "minor loops that are not congruent" in page
-
-
-def test_amplitude_and_delay_have_their_place(found: Identification, page: str) -> None:
-    """Three waves of one strength do not identify zero amplitude; the record is in time."""
-    vibration = fit_summary(found)["x"]["vibration"]
-    assert vibration["at_zero_amplitude"] is None
-    assert "one amplitude only" in page
-    assert vibration["delay"]["determined"]
-    assert abs(vibration["delay"]["found_s"]) < 1e-5  # a tenth of a sample
-    assert vibration["delay"]["of_the_model_s"] == 0.0
-
-
-def test_the_findings_on_a_short_record_are_shown(found: Identification, page: str) -> None:
-    warnings = found.axes["y"].report.warnings
-    assert any(isinstance(each, UndeterminedCreepElement) for each in warnings)
-    assert all(
-        f'<p class="warning">y: {escape(finding_text(each))}</p>' in page for each in warnings
-    )
-    assert fit_summary(found)["y"]["warnings"] == [finding_text(each) for each in warnings]
+def test_the_response_drawn_is_the_scanner_s(found: Identification) -> None:
+    lines = {line.get_label(): line for line in response_figure(found).axes[0].get_lines()}
+    assert set(lines) == {"levels", "model"}
+    frequency, size = (np.asarray(lines["model"].get_data()[k]) for k in (0, 1))
+    assert frequency[np.argmax(size)] == pytest.approx(FREQUENCY, rel=0.03)
+    measured_at, measured = (np.asarray(lines["levels"].get_data()[k]) for k in (0, 1))
+    near = (measured_at > 20.0) & (measured_at < 0.8 * FREQUENCY)
+    expected = np.interp(measured_at[near], frequency, size)
+    np.testing.assert_allclose(measured[near], expected, rtol=0.1)
+    assert measured.min() > 0.0
+    assert size.max() > GAIN * 1e6
 
 
 def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
-    for heading in ("Creep", "Vibration", "Hysteresis", "Model discrepancy"):
+    for heading in ("What is known", "Axis x", "Vibration", "Creep and hysteresis"):
         assert f"<h2>{heading}</h2>" in page
-    assert page.count("data:image/png;base64,") == 5
+    assert page.count("data:image/png;base64,") == 3
     assert 'src="http' not in page
-    assert f"{found.axes['x'].report.vibration.resonance:.7g} (" in page
+    assert "check, held out" in page
+    assert f"{found.axes['x'].records[0].misfit.samples:,}" in page
+
+
+def test_warnings_are_shown(found: Identification) -> None:
+    axis = evolve(found.axes["x"], warnings=(UncertainScan(0.034),))
+    warned = Identification({"x": axis})
+    text = finding_text(UncertainScan(0.034))
+    assert f'<p class="warning">x: {escape(text)}</p>' in fit_page(warned)
+    assert fit_summary(warned)["x"]["warnings"] == [text]

@@ -27,7 +27,6 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.validation import validate_from
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
@@ -285,5 +284,5 @@ def _driving(healthy: Sequence[Record], axis: str) -> list[Record]:
 
 def _error(model: AxisModel, one: Record, axis: str) -> ModelDiscrepancy:
     """Return the error on a whole record, that of an initial state not known among it."""
-    signals = AxisRecord.of(one, axis)
-    return validate_from(model, signals, f"healthy: {one.name}", 0).model_discrepancy
+    record = evolve(one.axis(axis), name=f"healthy: {one.name}")
+    return validate_from(model, record, 0).model_discrepancy

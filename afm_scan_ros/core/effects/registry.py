@@ -75,7 +75,7 @@ def hysteresis() -> EffectType:
         name="hysteresis",
         equation="F = sum of plays of u, weighted by the Everett surface E(alpha, beta), or dF/du ="
         " rising(u, F) while u grows and falling(u, F) while it falls",
-        needs="slow reversal curves over the whole range of the drive",
+        needs="moves between many levels over the whole range of the drive",
         experiment="hysteresis",
         remedy="feedforward",
         advice="scan within the range that was identified",

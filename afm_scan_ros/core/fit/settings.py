@@ -479,12 +479,6 @@ class FitSettings:
         "blocks of a record at least",
         "a record has hundreds of parameters",
     )
-    left_in_turns: float = setting(
-        1e-3,
-        "motion of a record",
-        "what fits of one effect after the other may leave, or all records are fitted together",
-        "a tenth of what a user is warned of",
-    )
     told: float = setting(
         0.5,
         "1",

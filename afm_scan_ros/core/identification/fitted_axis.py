@@ -1,10 +1,11 @@
 """Records of one axis, of any kinds → its model, by one fit of them all."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.estimator import AxisFit
@@ -13,7 +14,6 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.signals import in_step, known_from, reads_after
 from afm_scan_ros.core.fit.told import Knowledge
-from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.findings import (
     Finding,
     Hum,
@@ -25,6 +25,8 @@ from afm_scan_ros.core.identification.findings import (
     UnknownStart,
     ValidationMismatch,
 )
+from afm_scan_ros.core.identification.local_response import FrequencyResponse, local_response
+from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
     Validation,
@@ -33,7 +35,29 @@ from afm_scan_ros.core.identification.validation import (
 )
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback
+
+
+@frozen(eq=False)
+class FittedRecord:
+    """A record that was fitted: what the model leaves (m) at ``seconds`` from its start, (n,) both.
+
+    ``drive`` (V) and the model's ``effective`` input F (V) are those of all its samples, and
+    ``response`` is that of its displacement (m) to F, of the lines that it shows.
+    """
+
+    name: str
+    sample_period: float
+    seconds: Array
+    left: Array
+    drive: Array
+    effective: Array
+    response: FrequencyResponse
+
+    @property
+    def misfit(self) -> Misfit:
+        """Standard deviation and maximum of what the model leaves, m (Eqs. 2, 3)."""
+        return misfit(self.left)
 
 
 @frozen(eq=False)
@@ -41,57 +65,77 @@ class FittedAxis:
     """The model of an axis with figures of its fit.
 
     ``operator`` is that of the hysteresis; ``discrepancy`` is η, the model's error over the motion;
-    ``deviation`` is the standard deviation of a predicted scan over its range (1). ``left`` is the
-    rms (m) that the model leaves of each record, by name. ``validation`` is of the record held out,
-    where there is one.
+    ``deviation`` is the standard deviation of a predicted scan over its range (1). ``direct`` is
+    the error (V) of the drive that the paper's direct inverse gives for F of all records (Eqs. 18,
+    19). ``validations`` are of the records held out.
     """
 
     model: AxisModel
     operator: str
     discrepancy: float
     deviation: float
-    left: Mapping[str, float]
+    records: tuple[FittedRecord, ...]
+    direct: Misfit
     warnings: tuple[Finding, ...]
-    validation: Validation | None
+    validations: tuple[Validation, ...]
 
 
-def identify_together(
-    records: Sequence[Record], axis: str, progress: ProgressCallback
+def identify_axis(
+    records: Sequence[Record], axis: str, progress: ProgressCallback = lambda _: None
 ) -> FittedAxis:
-    """Identify an axis from all its records but one that is to validate.
+    """Identify an axis from all its records but those that are to validate.
 
     Raises InputError where the records show nothing or are not of one scanner, ScanError where the
     fit diverges.
     """
-    held_out = next((one for one in records if one.kind == "validation"), None)
-    fitting = [one for one in records if one is not held_out]
+    held_out = [one for one in records if one.kind == "validation"]
+    fitting = [one for one in records if one.kind != "validation"]
     if not fitting:
-        raise InputError("a validation record alone fits nothing: give more records")
+        raise InputError("validation records alone fit nothing: give more records")
     fit = fit_axis(fitting, axis, progress=progress)
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
     model, deviation = evolve(model_of(fit), effects=told.effects()), told.of_scan()
     progress("validating")
-    validation = None if held_out is None else error_of(model, held_out, axis)
-    known = [] if validation is None else [validation.model_discrepancy]
+    validations = [error_of(model, one, axis) for one in held_out]
+    known = [one.model_discrepancy for one in validations]
     for one in fitting:
-        error = validate_from(model, _in_step(one, axis), one.name, 0).model_discrepancy
+        error = validate_from(model, _in_step(one.axis(axis)), 0).model_discrepancy
         known.append(of_fitted(error, fit.discrepancy))
-    left = fit.residuals()
     return FittedAxis(
         model=model.also_known(known),
         operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
         discrepancy=fit.discrepancy,
         deviation=deviation,
-        left={r.name: float(np.std(each)) for r, each in zip(fit.records, left, strict=True)},
+        records=tuple(_fitted_records(fit)),
+        direct=_direct_misfit(model, [one.drive for one in fit.records]),
         warnings=(
             *_read_after(records, axis),
             *_of_fit(fit),
             *_of_scan(deviation),
-            *_of_validation(held_out, validation),
+            *_of_validation(held_out, validations),
         ),
-        validation=validation,
+        validations=tuple(validations),
     )
+
+
+def _fitted_records(fit: AxisFit) -> Iterator[FittedRecord]:
+    simulated, residuals = fit.simulated(fit.theta), fit.residuals()
+    for one, simulation, left in zip(fit.records, simulated, residuals, strict=True):
+        drive, effective = one.drive, simulation.effective
+        response = local_response(drive, effective, one.displacement, one.period)
+        yield FittedRecord(one.name, one.period, one.seconds, left, drive, effective, response)
+
+
+def _direct_misfit(model: AxisModel, drives: Sequence[Array]) -> Misfit:
+    """Error of the drives (V) that the direct inverse gives for what they make of F."""
+    exact, surface = model.hysteresis.operator(), model.hysteresis.direct
+    direct, errors = DirectInverse(surface), []
+    for drive in drives:
+        effective = exact.apply(exact.at_rest(), drive)[1]
+        within = np.clip(effective, surface.lower, surface.upper)
+        errors.append(direct.invert(direct.inverse_at_rest(), within)[1] - drive)
+    return misfit(np.concatenate(errors))
 
 
 def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
@@ -99,15 +143,15 @@ def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
 
     Raises InputError where the drive leaves the identified range.
     """
-    signals = _in_step(record, axis)
-    first = known_from(signals.drive, DEFAULT_SETTINGS, depolarised=record.depolarised)
-    return validate_from(model, signals, record.name, first)
+    given = _in_step(record.axis(axis))
+    first = known_from(given.drive[:, 0], DEFAULT_SETTINGS, depolarised=record.depolarised)
+    return validate_from(model, given, first)
 
 
-def _in_step(record: Record, axis: str) -> AxisRecord:
-    """Return an axis of a record as it were read just before its drive's updates."""
-    drive, moved = record.signals(axis)
-    return AxisRecord(in_step(drive, moved, DEFAULT_SETTINGS), moved, record.sample_period)
+def _in_step(record: Record) -> Record:
+    """Return a record of one axis as it were read just before its drive's updates."""
+    drive = in_step(record.drive[:, 0], record.displacement[:, 0], DEFAULT_SETTINGS)
+    return evolve(record, drive=drive[:, np.newaxis])
 
 
 def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
@@ -141,12 +185,12 @@ def _of_scan(deviation: float) -> Iterator[Finding]:
         yield UncertainScan(deviation)
 
 
-def _of_validation(record: Record | None, result: Validation | None) -> Iterator[Finding]:
+def _of_validation(records: Sequence[Record], results: Sequence[Validation]) -> Iterator[Finding]:
     """Yield what is wrong with the held-out data, or that there are none."""
-    if record is None or result is None:
+    if not records:
         yield NotValidated()
-        return
-    moved = float(np.std(record.displacement))
-    share = float(np.linalg.norm(result.model_discrepancy.rms)) / moved
-    if share > PREDICTED:
-        yield ValidationMismatch(record.name, share)
+    for record, result in zip(records, results, strict=True):
+        moved = float(np.std(record.displacement))
+        share = float(np.linalg.norm(result.model_discrepancy.rms)) / moved
+        if share > PREDICTED:
+            yield ValidationMismatch(record.name, share)

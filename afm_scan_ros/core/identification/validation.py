@@ -9,8 +9,9 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import extended_axis
-from afm_scan_ros.core.identification.alternating import AxisRecord
+from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 
@@ -22,86 +23,56 @@ DIGITS = 4
 
 @frozen(eq=False)
 class Validation:
-    """Residual in m of one axis, shape (n,), measured minus predicted, and what follows of it."""
+    """Residual in m of a ``record`` of one axis, (n,), measured minus predicted."""
 
+    record: str
     residual: Array
     sample_period: float
     model_discrepancy: ModelDiscrepancy
 
     @property
-    def sensor_noise(self) -> float:
-        """Rms of the sensor's noise over all bands, m."""
-        return float(np.linalg.norm(self.model_discrepancy.noise))
+    def misfit(self) -> Misfit:
+        """Standard deviation and maximum of the residual, m (Eqs. 2, 3)."""
+        return misfit(self.residual)
 
 
 PREDICTED = 0.02
 """Share of a held-out record's motion up to which the model may differ."""
-WEAK = 0.5
-"""Share of the largest drive that the weak waves at a frequency record's end do not reach."""
-LONG_ENOUGH = 0.1
-"""Share of the record that they are to last."""
 
 
-def validate(
-    model: AxisModel,
-    record: AxisRecord,
-    name: str,
-    first: int = 0,
-    last: int | None = None,
-    noise: float | None = None,
-) -> Validation:
-    """Predict a record from its start, at depolarised rest, and compare samples ``first`` to last.
+def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
+    """Predict a record of one axis from depolarised rest, and compare it from a sample on.
 
-    The ``noise`` (m) counts as white. Where it is not given, it is that of the rest before the
-    first move, and without a rest that of the band in which the residual is weakest. Raises
-    InputError where the drive leaves the identified range.
+    The sensor's zero is arbitrary, so that no mean is compared. Its noise is that of the rest
+    before the first move, and without a rest that of the band in which the residual is weakest.
+    The drive may leave the identified range by what predictions may. Raises InputError beyond that.
     """
-    _refuse_beyond(model, record.drive, name)
-    part, residual = slice(first, last), residual_of(model, record)
-    return _validation(model, record, name, part, residual[part], record.displacement[part], noise)
-
-
-def validate_from(model: AxisModel, record: AxisRecord, name: str, first: int) -> Validation:
-    """Compare as ``validate`` does, of a sensor whose zero is arbitrary: no mean is compared.
-
-    A drive may leave the identified range by what predictions may. Raises InputError beyond that.
-    """
-    wider = extended_axis(model, record.drive)
-    _refuse_beyond(wider, record.drive, name)
-    both = residual_of(wider, record), record.displacement
-    centred, moved = (signal[first:] - signal[first:].mean() for signal in both)
-    return _validation(model, record, name, slice(first, None), centred, moved)
-
-
-def residual_of(model: AxisModel, record: AxisRecord) -> Array:
-    """Displacement (m) of a record less that predicted from depolarised rest, (n,)."""
-    cascade = forward(model, record.sample_period)
-    return np.asarray(record.displacement - cascade.apply(cascade.at_rest(), record.drive)[1])
-
-
-def _validation(
-    model: AxisModel,
-    record: AxisRecord,
-    name: str,
-    part: slice,
-    residual: Array,
-    displacement: Array,
-    noise: float | None = None,
-) -> Validation:
-    """Take a residual of a part of a record, less white noise in each band, all in m rms."""
+    (axis,) = record.axes
+    drive, displacement = record.signals(axis)
+    wider = extended_axis(model, drive)
+    _refuse_beyond(wider, drive, record.name)
+    both = residual_of(wider, record), displacement
+    residual, moved = (signal[first:] - signal[first:].mean() for signal in both)
     period = record.sample_period
     bands = band_edges(period, resonance_of(model.vibration, period))
-    sensor = _noise(record, residual, bands) if noise is None else noise
+    sensor = _noise(drive, displacement, residual, bands)
     of_bands = sensor * np.sqrt(np.diff(bands) / bands[-1])
-    found, moved = (_by_band(signal, bands, 0.5 / bands[-1]) for signal in (residual, displacement))
+    found, motion = (_by_band(signal, bands, 0.5 / bands[-1]) for signal in (residual, moved))
     known = ModelDiscrepancy(
-        record=_description(name, record, part, sensor),
+        record=_description(record.name, drive[first:], period, sensor),
         bands=bands,
         rms=_rounded(np.sqrt(np.maximum(found**2 - of_bands**2, 0.0))),
         noise=_rounded(of_bands),
-        displacement=_rounded(moved),
+        displacement=_rounded(motion),
     )
-    return Validation(residual, period, known)
+    return Validation(record.name, residual, period, known)
+
+
+def residual_of(model: AxisModel, record: Record) -> Array:
+    """Displacement (m) of a record of one axis less that predicted from depolarised rest, (n,)."""
+    drive, displacement = record.signals(record.axes[0])
+    cascade = forward(model, record.sample_period)
+    return np.asarray(displacement - cascade.apply(cascade.at_rest(), drive)[1])
 
 
 def of_fitted(known: ModelDiscrepancy, share: float) -> ModelDiscrepancy:
@@ -121,26 +92,6 @@ def _by_band(signal: Array, bands: Sequence[float], sample_period: float) -> Arr
     return found
 
 
-def error_on_waves(
-    model: AxisModel, frequency: AxisRecord, noise: float
-) -> tuple[ModelDiscrepancy, ...]:
-    """What the model misses of the waves it was fitted to, the strong ones and the weak apart.
-
-    ``noise`` (m) is the sensor's: waves begin without a rest.
-
-    So it is known at small amplitude too, where a hysteresis model's relative error is larger,
-    and near resonances that the model lacks, which few other drives strike.
-    """
-    size, count = np.abs(frequency.drive), len(frequency.drive)
-    weak = int(np.flatnonzero(size > WEAK * size.max())[-1]) + 1
-    if count - weak < LONG_ENOUGH * count:
-        return (validate(model, frequency, "frequency", noise=noise).model_discrepancy,)
-    return (
-        validate(model, frequency, "frequency, strong waves", 0, weak, noise).model_discrepancy,
-        validate(model, frequency, "frequency, weak waves", weak, None, noise).model_discrepancy,
-    )
-
-
 def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
     surface = model.hysteresis.forward
     if drive.min() < surface.lower or drive.max() > surface.upper:
@@ -150,20 +101,19 @@ def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
         )
 
 
-def _noise(record: AxisRecord, residual: Array, bands: tuple[float, ...]) -> float:
+def _noise(drive: Array, moved: Array, residual: Array, bands: tuple[float, ...]) -> float:
     """Rms (m) of white noise: in a rest before the drive first moves, or in the weakest band."""
-    rest = int(np.argmax(record.drive != record.drive[0]))
+    rest = int(np.argmax(drive != drive[0]))
     if rest >= REST:
-        return float(np.std(record.displacement[:rest]))
+        return float(np.std(moved[:rest]))
     share = np.diff(bands) / bands[-1]
     enough = share * len(residual) >= REST
-    density = rms_by_band(residual, bands, record.sample_period)[enough] / np.sqrt(share[enough])
+    density = rms_by_band(residual, bands, 0.5 / bands[-1])[enough] / np.sqrt(share[enough])
     return float(density.min(initial=np.inf)) if enough.any() else 0.0
 
 
-def _description(name: str, record: AxisRecord, part: slice, noise: float) -> str:
-    drive = record.drive[part]
-    seconds, rate = len(drive) * record.sample_period, 1.0 / record.sample_period
+def _description(name: str, drive: Array, period: float, noise: float) -> str:
+    seconds, rate = len(drive) * period, 1.0 / period
     what = f"{name}: {drive.min():.2f} to {drive.max():.2f} V, {seconds:.1f} s at {rate:.0f} Hz"
     return what if noise else f"{what}, too short to measure the noise, which is in the rms"
 

@@ -1,42 +1,48 @@
-"""How often what is fitted to a noisy record holds the truth within its 95 % interval.
+"""How often the 95 % intervals that models state hold the truth.
 
-Each effect's own simulation is fitted seed by seed; the share of seeds is itself uncertain, by the
-exact binomial interval of Clopper and Pearson (Biometrika 26, 1934).
+The share of cases is itself uncertain, by the exact binomial interval of Clopper and Pearson
+(Biometrika 26, 1934).
 """
 
-from collections.abc import Callable, Iterable
-
+import numpy as np
+from attrs import frozen
 from scipy.stats import beta
 
-from afm_scan_bench.accuracy.intervals import creep, hysteresis, vibration
-from afm_scan_ros.report.table import Row, Table
-
-SEEDS = 200
-EFFECTS: tuple[Callable[[Iterable[int]], list[Row]], ...] = (
-    creep.coverage,
-    vibration.coverage,
-    hysteresis.coverage,
-)
-"""Each gives a row for each of its parameters."""
-
-COLUMNS = {
-    "effect": ("effect", ""),
-    "parameter": ("parameter", ""),
-    "true": ("true", ".5g"),
-    "half_width": ("± (95 %)", ".2g"),
-    "unit": ("unit", ""),
-    "seeds": ("seeds", "d"),
-    "inside_percent": ("inside, %", ".1f"),
-    "lowest_percent": ("at least, %", ".1f"),
-    "highest_percent": ("at most, %", ".1f"),
-}
+from afm_scan_ros.core.model import EffectStatus
+from afm_scan_ros.report.table import Row
 
 
-def measure() -> Table:
-    """Fit 200 records of each effect, their noise differing."""
-    rows = [with_bounds(row) for effect in EFFECTS for row in effect(range(SEEDS))]
-    title = "Records whose 95 % interval holds the truth, and 95 % bounds of that share"
-    return Table("coverage", title, COLUMNS, rows)
+@frozen
+class StatedInterval:
+    """The true value of a parameter beside the ends of its interval, in any unit."""
+
+    true: float
+    lower: float
+    upper: float
+
+    @classmethod
+    def of(cls, status: EffectStatus, name: str, true: float) -> "StatedInterval | None":
+        """Take what an effect states of a parameter, None where it states nothing."""
+        for each in status.intervals:
+            if each.name == name:
+                lower = 0.0 if each.lower is None else each.lower
+                return cls(true, lower, np.inf if each.upper is None else each.upper)
+        return None
+
+    @property
+    def error(self) -> float:
+        """Relative error of the value from which both ends are the same factor away."""
+        return float(np.sqrt(self.lower * self.upper)) / self.true - 1.0
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval's width over the truth."""
+        return 0.5 * (self.upper - self.lower) / self.true
+
+    @property
+    def inside(self) -> bool:
+        """Whether the interval holds the truth."""
+        return bool(self.lower <= self.true <= self.upper)
 
 
 def with_bounds(row: Row) -> Row:

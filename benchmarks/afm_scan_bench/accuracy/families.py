@@ -8,7 +8,7 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FAMILIES, MAPS, FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.identify import AxisIdentification, identify_axis
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
 from afm_scan_ros.report.table import Row, Table
 
 SHARES, RATES = (0.2, 0.4, 0.9), (1.0, 5.0, 30.0)
@@ -20,12 +20,9 @@ COLUMNS = {
     "family": ("family", ""),
     "maps": ("maps", ""),
     "operator": ("operator", ""),
-    "preisach_nm": ("fresh loops: Preisach, nm", ".1f"),
-    "duhem_nm": ("Duhem, nm", ".1f"),
-    "inverse": ("inverse", ""),
     "mapped": ("map", ""),
-    "exact_mv": ("fresh loops: exact, mV", ".2f"),
-    "direct_mv": ("direct, mV", ".2f"),
+    "stated_percent": ("stated for a whole scan, %", ".4f"),
+    "direct_mv": ("direct inverse, mV", ".1f"),
     "share_percent": ("% of range", ".0f"),
     "rms_percent": ("rms, %: 1 Hz", ".3f"),
     "rms_percent_5": ("5 Hz", ".3f"),
@@ -47,7 +44,7 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
     scanner = FamilyScanner.of(family, maps)
     row: Row = {"family": family, "maps": maps}
     try:
-        found = identify_axis(*scanner.records().values())
+        found = identify_axis(list(scanner.records().values()), "x")
     except (InputError, ScanError) as error:
         yield {**row, "refused": str(error)}
         return
@@ -55,24 +52,17 @@ def rows_of(family: str, maps: str) -> Iterator[Row]:
         yield {**row, **chosen(found), **errors(scanner, found, share), **target(family, share)}
 
 
-def chosen(found: AxisIdentification) -> Row:
-    """Errors of both operators and both inverses on fresh loops, and what they chose."""
-    hysteresis, report = found.model.hysteresis, found.report
-    fresh = {"exact_mv": report.exact, "direct_mv": report.direct}
-    choice = report.operator
-    operators: Row = {}
-    if choice is not None:
-        preisach, duhem = 1e9 * choice.preisach.sigma, 1e9 * choice.duhem.sigma
-        operators = {"operator": choice.chosen, "preisach_nm": preisach, "duhem_nm": duhem}
+def chosen(found: FittedAxis) -> Row:
+    """Operator, error stated of a scan over the whole drive, and error of the direct inverse."""
     return {
-        **operators,
-        "inverse": hysteresis.inverse,
-        "mapped": "yes" if hysteresis.output else "no",
-        **{name: 1e3 * each.sigma for name, each in fresh.items() if each},
+        "operator": found.operator,
+        "mapped": "yes" if found.model.hysteresis.output else "no",
+        "stated_percent": 100.0 * found.deviation,
+        "direct_mv": 1e3 * found.direct.sigma,
     }
 
 
-def errors(scanner: FamilyScanner, found: AxisIdentification, share: float) -> Row:
+def errors(scanner: FamilyScanner, found: FittedAxis, share: float) -> Row:
     """Rms errors of scans over a share of the range, % of the scan."""
     extent = share * scanner.reach()
     row: dict[str, float | str] = {"share_percent": 100.0 * share}

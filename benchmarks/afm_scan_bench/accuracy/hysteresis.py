@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from afm_scan_bench.accuracy.effective_input import effective_input
 from afm_scan_bench.accuracy.fresh_drives import FRESH, SAMPLE_RATE
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
-from afm_scan_ros.core.identification.alternating import AxisRecord, slow_input
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -28,7 +29,7 @@ COLUMNS = {
 def measure() -> Table:
     """Predict the drive of held-out records from their displacement."""
     rows: list[Row] = [
-        {"kind": kind, "axis": axis, "inverse": name, **errors(predicted - fresh.drive)}
+        {"kind": kind, "axis": axis, "inverse": name, **errors(predicted - fresh.drive[:, 0])}
         for kind, records in fresh_records().items()
         for axis, fresh in records.items()
         for name, predicted in predictions(default_model().axis(axis), fresh).items()
@@ -37,29 +38,23 @@ def measure() -> Table:
     return Table("hysteresis", title, COLUMNS, rows)
 
 
-def fresh_records() -> dict[str, dict[str, AxisRecord]]:
+def fresh_records() -> dict[str, dict[str, Record]]:
     """Records of the default plant under each kind of fresh drive, by kind and axis."""
     rng = np.random.default_rng(SEED)
     return {kind: record(drive(rng)) for kind, drive in FRESH.items()}
 
 
-def record(drive: Array, sample_rate: float = SAMPLE_RATE) -> dict[str, AxisRecord]:
+def record(drive: Array) -> dict[str, Record]:
     """Record of the default plant, by axis; both are driven by ``drive`` (V), shape (n,)."""
-    period = 1.0 / sample_rate
+    period = 1.0 / SAMPLE_RATE
     trace = Trace(0, period, drive, drive)
     measured, _ = Piezoscanner(default_plant(), period, SEED).advance(trace)
-    return {axis: AxisRecord(drive, measured.axis(axis), period) for axis in AXES}
+    return {axis: Record(drive, measured.axis(axis), period, (axis,)) for axis in AXES}
 
 
-def effective_input(model: AxisModel, fresh: AxisRecord) -> Array:
-    """F (V) of a record by the model's inverses of creep and vibration, shape (n,)."""
-    rigid = fresh.freed_of(model.creep).displacement
-    return slow_input(model.vibration, rigid, fresh.sample_period)
-
-
-def predictions(model: AxisModel, fresh: AxisRecord) -> dict[str, Array]:
+def predictions(model: AxisModel, fresh: Record) -> dict[str, Array]:
     """Drive, V, that each inverse predicts from the record freed of creep and vibration."""
-    effective = effective_input(model, fresh)
+    effective = effective_input(model, fresh.displacement[:, 0], fresh.sample_period)
     exact, direct = model.hysteresis.operator(), DirectInverse(model.hysteresis.direct)
     return {
         "exact": exact.invert(exact.inverse_at_rest(), effective)[1],

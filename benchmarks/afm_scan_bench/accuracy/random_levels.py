@@ -13,7 +13,7 @@ import afm_scan_ros as afm
 from afm_scan_bench.families.operators import LIMIT
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_ros.core.identification.drives.excitation import excitation_block, validation_plan
-from afm_scan_ros.core.identification.together import identify_together
+from afm_scan_ros.core.identification.fitted_axis import identify_axis
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
@@ -51,7 +51,7 @@ def case(family: str) -> Row:
     measured, _ = scanner.displacement(drive, plan.sample_period, RECORDED)
     record = afm.Record(drive, measured, plan.sample_period, start="depolarised")
     begun = time.process_time()
-    found = identify_together([record], "x", lambda _: None)
+    found = identify_axis([record], "x")
     seconds = time.process_time() - begun
     model = afm.Model(ScannerModel(x=found.model), "random levels alone")
     errors = {name: _errors(scanner, model, *scan) for name, scan in SCANS.items()}

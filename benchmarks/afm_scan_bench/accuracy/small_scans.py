@@ -1,7 +1,7 @@
 """Small scans: offset, gain and shape of the true error on the default plant and on slip elements.
 
-An atomic force microscope mostly makes scans of a few micrometres. A surface that is straight
-between levels has no loop within one of its cells, so small scans are where levels show.
+An atomic force microscope mostly makes scans of a few micrometres. Plays of few thresholds have no
+loop below the smallest of them, so small scans are where thresholds show.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,7 +12,8 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
-from afm_scan_ros.core.identification.identify import identify_axis, identify_records
+from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
@@ -41,10 +42,10 @@ def measure() -> Table:
 
 def scanners() -> dict[str, Callable[[ScanSpec], Scan]]:
     """Identify each scanner from its own four records, and measure how it scans with its model."""
-    found = calibrate_in_process(default_plant(), SEED)
-    own = identify_records([evolve(each, kind=kind) for kind, each in found.items()]).model
+    records = calibrate_in_process(default_plant(), SEED)
+    own = identify_records(list(records.values())).model
     slip = FamilyScanner.of("slip", "cube behind")
-    model = identify_axis(*slip.records().values()).model
+    model = identify_axis(list(slip.records().values()), "x").model
     return {
         "default plant": lambda spec: scan(spec, ALL, model=own),
         "slip elements, cube behind": lambda spec: slip.scan(spec, model),

@@ -14,7 +14,7 @@ import afm_scan_ros as afm
 from afm_scan_bench.any_lab.protocols import PROTOCOLS, raised, taken
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.together import FittedAxis, identify_together
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
@@ -61,7 +61,7 @@ def case(seed: int) -> Row:
     row: Row = {"seed": seed, "protocol": protocol, "family": family, "line": left}
     begun = time.process_time()
     try:
-        found = identify_together(records, "x", lambda _: None)
+        found = identify_axis(records, "x")
     except (InputError, ScanError) as error:
         return {
             **row,

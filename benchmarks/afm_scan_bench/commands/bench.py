@@ -12,18 +12,13 @@ QUICK = {
         "plant",
         "creep",
         "hysteresis",
-        "ramp_rate",
         "hold",
         "preview",
         "tracking",
         "mismatch",
         "robustness",
-        "record_length",
         "table1",
         "tradeoff",
-        "vibration",
-        "order",
-        "delay",
         "play",
         "reach",
     ),
@@ -48,10 +43,8 @@ SPEED = {
 }
 LONG = {
     "accuracy": (
-        "coverage",
         "chain_coverage",
         "families",
-        "best_preisach",
         "small_scans",
         "from_scans",
         "planned",
@@ -81,7 +74,7 @@ LONGEST = {
 }
 
 GROUPS: dict[str, Mapping[str, tuple[str, ...]]] = {
-    "run without a name: a minute or less each, some five together": QUICK,
+    "run without a name: a minute or less each, one or two together": QUICK,
     "of measurements in the folder AFM_SCAN_DATA, some minutes each": MEASURED,
     "of speed and size, some minutes each, with nothing else running": SPEED,
     "many minutes each": LONG,

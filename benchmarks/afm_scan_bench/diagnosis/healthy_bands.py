@@ -14,7 +14,7 @@ from scipy.stats import f as f_distribution
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.identification.identify import identify_axis
+from afm_scan_ros.core.identification.fitted_axis import identify_axis
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
@@ -50,7 +50,7 @@ def measure() -> Table:
 def ratios(family: str) -> Iterator[Array]:
     """Rms residual over the limit in the bands of each healthy scan of a family."""
     scanner = FamilyScanner.of(family, "none" if family in ("play", "duhem") else "cube behind")
-    model = identify_axis(*scanner.records(SEED).values()).model
+    model = identify_axis(list(scanner.records(SEED).values()), "x").model
     rng = np.random.default_rng(sum(map(ord, family)))
     for _ in range(SCANS):
         rate, lines = float(rng.choice(RATES)), int(rng.choice(LINES))

@@ -1,6 +1,6 @@
 """Scanners of five families of hysteresis, each between memoryless maps, with the default stage."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from attrs import frozen
@@ -18,18 +18,15 @@ from afm_scan_bench.families.operators import (
 )
 from afm_scan_bench.scans import ALL, SEED, default_plant
 from afm_scan_ros.core.compensation import Compensation
-from afm_scan_ros.core.identification.alternating import AxisRecord
-from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
+from afm_scan_ros.core.identification.drives.excitation import PLANS, excitation_block
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.simulation.axis import Dynamics
 from afm_scan_ros.simulation.scanner import read
-
-Makes = Callable[[], Plan[Waveform]]
 
 RANGE = 11.0
 """V of effective input over the drive's range, as the paper's scanner has."""
@@ -96,19 +93,16 @@ class FamilyScanner:
         stage = Dynamics.from_spec(default_plant().x, default_plant().sensor_sensitivity)
         return 2.0 * min(abs(end) for end in ends) * float(stage.response(np.array([1e3]))[0].real)
 
-    def records(
-        self, seed: int = SEED, plans: Mapping[str, Makes] = PLANS, *, exact: bool = False
-    ) -> dict[str, AxisRecord]:
-        """Return the calibration records, each of a scanner fresh from rest, by name.
-
-        Where they are to be ``exact``, they have no noise.
-        """
+    def records(self, seed: int = SEED) -> dict[str, Record]:
+        """Return the calibration records, each of a scanner fresh from rest, by name."""
         found = {}
-        for name, plan in plans.items():
+        for name, plan in PLANS.items():
             made = plan()
             drive = excitation_block(made, 0, made.total_samples).x
-            measured, true = self.displacement(drive, made.sample_period, seed)
-            found[name] = AxisRecord(drive, true if exact else measured, made.sample_period)
+            measured, _ = self.displacement(drive, made.sample_period, seed)
+            found[name] = Record(
+                drive, measured, made.sample_period, kind=name, start="depolarised", name=name
+            )
         return found
 
     def scan(self, spec: ScanSpec, model: AxisModel) -> Scan:

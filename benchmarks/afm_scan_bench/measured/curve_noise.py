@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
+from afm_scan_bench.measured.reversal_curve import ReversalCurve
 from afm_scan_ros.core.types import Array
 
 MEDIAN_TO_DEVIATION = 1.4826

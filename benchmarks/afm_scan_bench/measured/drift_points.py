@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import evolve
 
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
+from afm_scan_bench.measured.reversal_curve import ReversalCurve
 from afm_scan_ros.core.types import Array
 
 NEIGHBOURS = 11

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from attrs import field, frozen
 
+from afm_scan_bench.measured.reversal_curve import ReversalCurve
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import ReversalCurve
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.files.yaml import read_text
 

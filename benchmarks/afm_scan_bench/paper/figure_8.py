@@ -9,8 +9,8 @@ from afm_scan_bench.accuracy.fresh_drives import loops
 from afm_scan_bench.accuracy.hysteresis import predictions, record
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_bench.scans import SEED, default_model
-from afm_scan_ros.core.identification.alternating import AxisRecord
 from afm_scan_ros.core.identification.records.recording import misfit
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.style import BLUE, GREY, ORANGE, STYLE, styled
 
@@ -34,7 +34,7 @@ def section() -> Section:
     """Predict a fresh record's drive with both inverses."""
     fresh = record(loops(np.random.default_rng(SEED)))["x"]
     predicted = predictions(default_model().axis("x"), fresh)
-    errors = {name: misfit(drive - fresh.drive) for name, drive in predicted.items()}
+    errors = {name: misfit(drive - fresh.drive[:, 0]) for name, drive in predicted.items()}
     compared = [
         row
         for name in (DIRECT, EXACT)
@@ -57,25 +57,26 @@ def section() -> Section:
 
 
 @styled
-def _drawn(fresh: AxisRecord, predicted: Mapping[str, Array]) -> Figure:
+def _drawn(fresh: Record, predicted: Mapping[str, Array]) -> Figure:
     """Draw the drives over time, the errors below, and the hysteresis that was undone beside."""
     figure = Figure(figsize=(9.6, 4.6), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0), height_ratios=(1.6, 1.0))
-    every = slice(None, None, max(1, len(fresh.drive) // POINTS))
-    time = (np.arange(len(fresh.drive)) * fresh.sample_period)[every]
+    drive, displacement = fresh.signals("x")
+    every = slice(None, None, max(1, len(drive) // POINTS))
+    time = (np.arange(len(drive)) * fresh.sample_period)[every]
     above = figure.add_subplot(grid[0, 0])
-    above.plot(time, fresh.drive[every], color=GREY, lw=3.0, label="applied")
+    above.plot(time, drive[every], color=GREY, lw=3.0, label="applied")
     above.plot(time, predicted[DIRECT][every], color=BLUE, label="predicted")
     above.set_ylabel("drive in V")
     above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
     below = figure.add_subplot(grid[1, 0], sharex=above)
     for name, colour in ((DIRECT, ORANGE), (EXACT, BLUE)):
-        error = MILLI * (predicted[name] - fresh.drive)
+        error = MILLI * (predicted[name] - drive)
         below.plot(time, error[every], color=colour, lw=0.7, label=name)
     below.axhline(0.0, color=STYLE["axes.edgecolor"], lw=0.6)
     below.set(xlabel="time in s", ylabel="error in mV")
     below.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
     beside = figure.add_subplot(grid[:, 1])
-    beside.plot(fresh.drive[every], 1e6 * fresh.displacement[every], color=BLUE, lw=0.6)
+    beside.plot(drive[every], 1e6 * displacement[every], color=BLUE, lw=0.6)
     beside.set(xlabel="drive in V", ylabel="measured x in µm")
     return figure

@@ -1,4 +1,4 @@
-"""Figures of hysteresis: fresh records, ramps, intervals, measured curves."""
+"""Figures of hysteresis: fresh records and measured curves."""
 
 import os
 from pathlib import Path
@@ -8,11 +8,13 @@ import pytest
 
 from afm_scan_bench.accuracy import hysteresis
 from afm_scan_bench.accuracy.fresh_drives import FRESH, LIMIT
-from afm_scan_bench.accuracy.intervals.hysteresis import coverage
-from afm_scan_bench.accuracy.ramp_rate import rows_at
+from afm_scan_bench.families.operators import LIMIT as LIMIT_OF_PLAYS
+from afm_scan_bench.families.operators import applied
+from afm_scan_bench.families.scanners import FAMILIES
 from afm_scan_bench.measured import forc
 from afm_scan_bench.measured.micromag import read_micromag
 from afm_scan_bench.measured.recordings import measured_data
+from afm_scan_bench.measured.reversal_curve import ReversalCurve
 from afm_scan_bench.scans import default_model
 from afm_scan_ros.files import share_directory
 
@@ -25,31 +27,35 @@ def test_exact_inverse_on_fresh_records(kind: str) -> None:
     assert np.abs(drive).max() <= LIMIT
     assert drive[0] == pytest.approx(0.0, abs=1e-9)
     for axis, fresh in hysteresis.record(drive).items():
-        exact, direct = hysteresis.predictions(default_model().axis(axis), fresh).values()
-        found = hysteresis.errors(exact - fresh.drive)
+        predicted = hysteresis.predictions(default_model().axis(axis), fresh).values()
+        exact, direct = (each - drive for each in predicted)
+        found = hysteresis.errors(exact)
         assert found["sigma_percent"] <= 0.06
         assert found["max_percent"] <= 0.2
-        assert hysteresis.errors(direct - fresh.drive)["sigma_percent"] <= 0.52  # Eq. 18
-
-
-@pytest.mark.parametrize("rate", [10.0, 300.0])
-def test_only_the_freed_record_shows_the_loop_that_no_rate_changes(rate: float) -> None:
-    for row in rows_at(rate):
-        static = float(row["static"])
-        assert abs(float(row["as_recorded"]) - static) > 1.0
-        assert float(row["without_all"]) == pytest.approx(static, abs=0.05)
-
-
-def test_intervals_hold_the_truth_about_as_often_as_stated() -> None:
-    """12 seeds of five values: 60 draws, of which 95 % means at least 50 all but surely."""
-    rows = coverage(range(12))
-    assert np.mean([float(row["inside_percent"]) for row in rows]) > 100.0 * 50.0 / 60.0
+        assert hysteresis.errors(direct)["sigma_percent"] <= 0.52  # Eq. 18
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no curves at {DATA}: AFM_SCAN_DATA")
-def test_measured_curves_left_out_are_predicted() -> None:
+def test_measured_curves_are_divided() -> None:
     record = read_micromag(measured_data(forc.RECORD))
     assert (len(record.curves), sum(len(c.inputs) for c in record.curves)) == (152, 30476)
-    found = forc.held_out_figures(forc.freed_curves(record), 101)
-    assert float(found["rms_percent"]) < 0.05
-    assert float(found["over_noise"]) < 2.0
+    kept, held_out = forc.divided(forc.freed_curves(record))
+    assert (len(kept), len(held_out)) == (122, 30)
+    assert len({curve.inputs[-1] for curve in (*kept, *held_out)}) == 1
+
+
+def curve(turn: float, rng: np.random.Generator) -> ReversalCurve:
+    """Curve of plays from a turn (V), in mV, with noise."""
+    rise = np.linspace(turn, LIMIT_OF_PLAYS, 60)
+    path = np.concatenate([[0.0, LIMIT_OF_PLAYS], rise])
+    moved = 1e-6 * applied(FAMILIES["play"], path)[2:] + 1e-9 * rng.standard_normal(len(rise))
+    return ReversalCurve(1e3 * rise, moved)
+
+
+def test_curves_left_out_are_predicted() -> None:
+    rng = np.random.default_rng(1)
+    curves = [curve(turn * LIMIT_OF_PLAYS, rng) for turn in np.linspace(0.9, -1.0, 25)]
+    kept, held_out = forc.divided(curves)
+    found = forc.held_out_figures(curves, held_out, forc.predicted(kept, held_out))
+    assert found["points"] == 300
+    assert float(found["rms_percent"]) < 0.2

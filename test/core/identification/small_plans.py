@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from afm_scan_ros.core.identification.drives.excitation import Plan, creep_plan, hysteresis_plan
+from afm_scan_ros.core.identification.drives.excitation import Plan, creep_plan
 from afm_scan_ros.core.identification.drives.waveforms import (
     Multisine,
     Waveform,
-    Waypoints,
     random_phase_waves,
 )
+from helpers.small_records import levels
 
 
 def frequency() -> Plan[Multisine]:
@@ -23,25 +23,10 @@ def frequency() -> Plan[Multisine]:
     return Plan("frequency", axis(), axis())
 
 
-def validation() -> Plan[Waypoints]:
-    """Sixty moves between random levels, 10 to 2000 V/s, sampled at 50 kHz."""
-    rng = np.random.default_rng(7)
-
-    def axis() -> Waypoints:
-        levels = np.concatenate([[0.0, 0.0], 3.6 * rng.uniform(-1.0, 1.0, 60), [0.0, 0.0]])
-        speeds = np.geomspace(10.0, 2000.0, 61)
-        moves = np.abs(np.diff(levels[1:-1])) / speeds + 1e-3
-        seconds = np.concatenate([[0.1], moves, [0.1]])
-        samples = np.concatenate([[0.0], np.cumsum(np.rint(5e4 * seconds))])
-        return Waypoints(2e-5, levels, samples, blend=50.0)
-
-    return Plan("validation", axis(), axis())
-
-
 PLANS: dict[str, Plan[Waveform]] = {
     "creep": creep_plan((60.0, 30.0)),
     "frequency": frequency(),
-    "hysteresis": hysteresis_plan(levels=5),
-    "validation": validation(),
+    "hysteresis": Plan("hysteresis", levels(8), levels(9)),
+    "validation": Plan("validation", levels(7), levels(6)),
 }
 """The four records, by name."""

@@ -93,12 +93,6 @@ def of_y(drive: Trace, moved: Trace) -> Signals:
     return drive, evolve(moved, x=moved.y)
 
 
-def saturated(drive: Trace, _moved: Trace) -> Signals:
-    """Recorded is the drive asked for, not what an amplifier at its limit makes of it."""
-    limited = evolve(drive, x=np.minimum(drive.x, 0.7 * drive.x.max()))
-    return drive, Piezoscanner(default_plant(), drive.sample_period, 1).advance(limited)[0]
-
-
 def first_rows(drive: Trace, moved: Trace) -> Signals:
     return tuple(evolve(t, x=t.x[:3], y=t.y[:3]) for t in (drive, moved))
 
@@ -107,12 +101,9 @@ def in_millivolts(drive: Trace, moved: Trace) -> Signals:
     return evolve(drive, x=1e3 * drive.x), moved
 
 
-ONLY_HYSTERESIS = ("creep", "frequency", "validation")
-"""In the others it shows only beside other records: test_cross_checks.py."""
 Damage = tuple[Callable[[Trace, Trace], Signals], str, tuple[str, ...]]
 DAMAGE: dict[str, Damage] = {
     "clipped": (measured(lambda x: np.minimum(x, 0.7 * x.max())), "clipped at its upper end", ()),
-    "saturated": (saturated, "x saturates: at the top", ONLY_HYSTERESIS),
     "held": (measured(held), "(stands still|jumps, as if samples were lost, held)", ()),
     "lost": (measured(lost), "(jumps, as if samples were lost|are not synchronised)", ()),
     "repeated": (measured(repeated), "repeats what was before", ("creep",)),

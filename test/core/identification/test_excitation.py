@@ -71,14 +71,15 @@ def test_creep_is_stepped_within_one_sample_and_left_slowly() -> None:
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_ramps_of_the_reversal_curves_stay_below_the_resonance(axis: str) -> None:
+def test_the_slowest_moves_between_levels_do_not_strike_the_resonance(axis: str) -> None:
     drive, period = whole_drive("hysteresis").axis(axis), whole_drive("hysteresis").sample_period
-    frequency = np.fft.rfftfreq(len(drive), period)
-    power = np.abs(np.fft.rfft(drive)) ** 2
-    assert power[frequency > 300.0].sum() < 1e-10 * power[1:].sum()
+    slow = drive[: round(3.0 / period)]
+    frequency = np.fft.rfftfreq(len(slow), period)
+    power = np.abs(np.fft.rfft(slow * np.hanning(len(slow)))) ** 2
+    assert power[frequency > 300.0].sum() < 1e-6 * power[1:].sum()
 
 
 def test_every_level_is_reached_exactly() -> None:
-    plan = hysteresis_plan(limit=3.0, levels=7).y
+    plan = hysteresis_plan(limit=3.0).y
     at_turns = plan.voltage(plan.samples)
     np.testing.assert_allclose(at_turns, plan.levels, rtol=0.0, atol=1e-12)

@@ -18,7 +18,7 @@ from afm_scan_ros.core.identification.findings import (
     NotValidated,
     UncertainScan,
 )
-from afm_scan_ros.core.identification.together import FittedAxis, identify_together
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
 from afm_scan_ros.core.model import ParameterInterval, Status
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
@@ -84,11 +84,11 @@ def error_on(found: FittedAxis, drive: Array) -> float:
 def fit(request: pytest.FixtureRequest) -> FittedAxis:
     given = measured("loops", LOOPS, 2, request.param)
     held_out = measured("fresh", FRESH, 5, request.param, "validation")
-    return identify_together([given, held_out], "x", lambda _: None)
+    return identify_axis([given, held_out], "x", lambda _: None)
 
 
 def test_records_are_matched_to_the_noise(fit: FittedAxis) -> None:
-    assert 0.9 * NOISE < fit.left["loops"] < 1.1 * NOISE
+    assert 0.9 * NOISE < fit.records[0].misfit.sigma < 1.1 * NOISE
 
 
 def within(interval: ParameterInterval, true: float) -> bool:
@@ -118,7 +118,7 @@ def test_a_scan_is_as_uncertain_as_is_stated(fit: FittedAxis) -> None:
 
 
 def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
-    assert fit.validation is not None
+    assert [one.record for one in fit.validations] == ["fresh"]
     known, *fitted = fit.model.model_discrepancies
     assert known.record.startswith("fresh")
     assert [each.fitted for each in fitted] == [True]
@@ -131,7 +131,7 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
         measured("slow", swinging(12.0, size), 3),
         measured("fast", swinging(6.0, 0.5 * size, rate=4.0), 4),
     ]
-    found = identify_together(records, "x", lambda _: None)
+    found = identify_axis(records, "x", lambda _: None)
     fresh = swinging(10.0, 0.75 * size, rate=2.0)
     assert error_on(found, fresh) < 3e-3 * np.ptp(moved(fresh))
 
@@ -152,7 +152,7 @@ def test_curves_that_turn_in_part_of_the_drive_predict_those_between() -> None:
         return np.roll(rows_of_record, 1)
 
     drive, fresh = (curves(np.linspace(LOWER, top, count)) for top, count in ((1.0, 21), (0.9, 14)))
-    found = identify_together([Record(drive, answer(drive), 1.0)], "x", lambda _: None)
+    found = identify_axis([Record(drive, answer(drive), 1.0)], "x", lambda _: None)
     assert found.model.effects.hysteresis.status is Status.IDENTIFIED
     model = forward(found.model, 1.0)
     error = (model.apply(model.at_rest(), fresh)[1] - answer(fresh))[1:]
@@ -180,7 +180,7 @@ def test_steps_alone_tell_creep_and_not_hysteresis() -> None:
     noise = np.random.default_rng(8).normal(0.0, 1e-9, len(drive))
     measured_there = displaced(OPERATORS["bouc_wen"], drive, period) + noise
     steps = Record(drive, measured_there, period, start="depolarised", name="steps")
-    found = identify_together([steps], "x", lambda _: None)
+    found = identify_axis([steps], "x", lambda _: None)
     statuses = {name: each.status for name, each in found.model.effects.each()}
     assert statuses == {
         "creep": Status.IDENTIFIED,
@@ -195,7 +195,7 @@ def test_steps_alone_tell_creep_and_not_hysteresis() -> None:
 
 def test_hum_in_a_record_is_named_with_its_amplitude() -> None:
     tone = 20e-9
-    found = identify_together([record(OPERATORS["plays"], levels(1, 14, 600), tone)], "x", print)
+    found = identify_axis([record(OPERATORS["plays"], levels(1, 14, 600), tone)], "x", print)
     (hum,) = (each for each in found.warnings if isinstance(each, Hum))
     ((frequency, amplitude),) = hum.lines
     assert frequency == pytest.approx(50.02, abs=0.15)  # half a bin of 3.3 s
@@ -208,7 +208,7 @@ def test_scans_alone_tell_a_scanner_of_one_state_from_plays() -> None:
     cycles = 2e-4 * np.arange(16_000)
     triangle = 2.0 * np.abs(2.0 * ((cycles + 0.25) % 1.0) - 1.0) - 1.0
     scans = [record(OPERATORS["bouc_wen"], size * triangle) for size in (3.0, 1.3)]
-    found = identify_together(scans, "x", lambda _: None)
+    found = identify_axis(scans, "x", lambda _: None)
     assert found.operator == "one state"
     fresh = 2.2 * triangle
     model = forward(found.model, PERIOD)

@@ -141,17 +141,17 @@ def resonant(damping: float) -> PlantSpec:
 
 
 def test_a_lightly_damped_resonance_stops_at_the_excitation_allowed() -> None:
-    limits = evolve(LIMITS, excitation=0.2 * RANGE)
-    record = proposed("vibration")
+    limits = evolve(LIMITS, excitation=0.06 * RANGE)
+    record = proposed("hysteresis")
     calm, ringing = (grown(record, resonant(damping), limits)[-1] for damping in (0.1, 0.003))
     assert (calm.step.share, calm.step.reached) == (1.0, None)
     assert ringing.step.reached is not None
     assert (ringing.step.reached.axis, ringing.step.reached.quantity) == ("x", "excitation")
     assert ringing.step.share < 0.8
-    assert 0.8 * limits.excitation < ringing.responses["x"].excitation < 1.02 * limits.excitation
+    assert 0.4 * limits.excitation < ringing.responses["x"].excitation < 1.02 * limits.excitation
 
 
-@pytest.mark.parametrize("identifies", ["resonance", "creep", "hysteresis", "vibration", "error"])
+@pytest.mark.parametrize("identifies", ["resonance", "creep", "hysteresis", "error"])
 def test_a_trial_goes_as_far_and_rings_as_much_as_its_record(identifies: str) -> None:
     record = proposed(identifies, Coverage() if identifies == "resonance" else KNOWN)
     peaks = []

@@ -14,9 +14,6 @@ DRIVES = {
     "multisine": np.tile(NOISE[:5000], 6),
     "sweep": signal.chirp(TIME, 1.0, TIME[-1], 500.0, "log"),
     "noise": signal.lfilter(*signal.butter(4, 0.1), NOISE),
-    "reversal_curves": np.interp(
-        np.arange(11.0 * 500), 500.0 * np.arange(12), [0, 1, -1, 1, -0.5, 1, 0, 1, 0.5, 1, -1, 0]
-    ),
     "loops": TIME * np.sin(2.0 * np.pi * 3.0 * TIME),
     "scan": np.tile(np.interp(np.arange(1000.0), [0.0, 500.0, 1000.0], [-1.0, 1.0, -1.0]), 9),
 }
@@ -41,7 +38,6 @@ def test_a_drive_before_or_after_that_of_another_axis(kind: str, rests: tuple[in
 
 
 def test_a_sweep_of_few_samples_a_cycle() -> None:
-    """Its sampled maxima differ from cycle to cycle, as the turns of reversal curves do."""
     sweep = signal.chirp(TIME, 0.5, TIME[-1], 1200.0, "log", -90.0)
     assert [each.kind for each in stretches(sweep)] == ["sweep"]
 

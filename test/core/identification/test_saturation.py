@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from afm_scan_ros.core.identification.records.motion import saturation_problems
+from afm_scan_ros.core.identification.records.motion import saturation_problems, turning_points
 from afm_scan_ros.core.types import Array
+from helpers.fit_cases import OPERATORS, levels, record
 
 SAMPLES = 4000
 DRIVE = np.concatenate([np.linspace(0.0, 10.0, SAMPLES), np.linspace(10.0, 0.0, SAMPLES)])
@@ -28,3 +29,14 @@ def test_a_limit_is_found_under_a_little_hum() -> None:
         moved = np.maximum(DRIVE, 2.0) + 0.03 * hum
         (message,) = saturation_problems("x", DRIVE, moved)
         assert "saturates: at the bottom" in message
+
+
+def test_a_drive_turns_where_it_pauses_first() -> None:
+    drive = np.array([0.0, 1.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.5, 0.5, 1.0])
+    assert turning_points(drive).tolist() == [2, 6]
+
+
+def test_a_stage_that_rings_is_at_no_limit() -> None:
+    """A fast move turns at its end while the stage swings back."""
+    slipping = record(OPERATORS["plays"], levels(2, 8, 500))
+    assert not list(saturation_problems("x", *slipping.signals("x")))

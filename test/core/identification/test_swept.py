@@ -1,4 +1,4 @@
-"""Sweeps show the response of a known filter, and are refused where hysteresis bends them."""
+"""Sweeps, noise and steps show the response of a known filter by local fits."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,8 @@ from scipy import signal
 import afm_scan_ros as afm
 from afm_scan_ros.core.identification.drives.excitation import frequency_plan
 from afm_scan_ros.core.identification.drives.waveforms import Chirp, SteppedSine, whole
-from afm_scan_ros.core.identification.vibration.frequency_response import (
-    frequency_response,
-    is_sweep,
-)
-from afm_scan_ros.core.identification.vibration.response_checks import DISTORTION
+from afm_scan_ros.core.identification.local_response import FrequencyResponse, local_response
+from afm_scan_ros.core.identification.records.kinds import is_sweep
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
 
@@ -32,13 +29,18 @@ def system() -> tuple[Array, Array]:
     return numerator[0], denominator
 
 
+def true_response(found: FrequencyResponse) -> Array:
+    """Complex response of the filter at the lines found."""
+    return np.asarray(signal.freqz(*system(), 2.0 * np.pi * found.frequency * PERIOD)[1])
+
+
 @pytest.mark.parametrize("plan", PLANS)
 def test_response_is_that_of_the_filter(plan: str) -> None:
     drive = whole(PLANS[plan])
     assert is_sweep(drive)
-    found = frequency_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
-    _, true = signal.freqz(*system(), found.omega * PERIOD)
-    assert len(found.omega) > 50
+    found = local_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
+    true = true_response(found)
+    assert len(found.frequency) > 50
     error = np.abs(found.response / true - 1.0)
     assert np.median(error) < 1e-4
     assert error[found.frequency > 20.0].max() < 5e-3
@@ -49,7 +51,7 @@ def test_deviation_is_that_of_the_noise() -> None:
     drive = whole(CHIRP)
     clean = signal.lfilter(*system(), drive)
     noisy = clean + 0.01 * np.random.default_rng(1).standard_normal(len(drive))
-    exact, found = (frequency_response(drive, drive, y, PERIOD) for y in (clean, noisy))
+    exact, found = (local_response(drive, drive, y, PERIOD) for y in (clean, noisy))
     error = np.abs(found.response - exact.response)
     assert np.sqrt(np.mean((error / found.deviation) ** 2)) == pytest.approx(1.0, abs=0.15)
 
@@ -63,8 +65,8 @@ def test_the_way_to_a_sweep_and_back_shows_no_line() -> None:
     drive, moved = way.copy(), 1.1 * way
     drive[14_000:54_000] += sweep
     moved[14_000:54_000] += sweep
-    found = frequency_response(drive, drive, signal.lfilter(*system(), moved), PERIOD)
-    _, true = signal.freqz(*system(), found.omega * PERIOD)
+    found = local_response(drive, drive, signal.lfilter(*system(), moved), PERIOD)
+    true = true_response(found)
     assert np.abs(found.response / true - 1.0).max() < 0.01
 
 
@@ -75,26 +77,34 @@ def hysteretic(drive: Array) -> Array:
     return bank.apply(bank.relaxed(), drive)[1]
 
 
-def test_sweep_with_hysteresis_in_it_is_named() -> None:
-    drive = whole(CHIRP)
-    output = signal.lfilter(*system(), hysteretic(drive))
-    assert frequency_response(drive, drive, output, PERIOD).distortion > DISTORTION
-    effective = hysteretic(drive)
-    found = frequency_response(drive, effective, output, PERIOD)
-    assert found.distortion < DISTORTION
-    _, true = signal.freqz(*system(), found.omega * PERIOD)
-    assert np.median(np.abs(found.response / true - 1.0)) < 1e-3
-
-
 def test_sweep_cut_at_its_end_serves_too() -> None:
     drive = whole(CHIRP)[:-6000]
-    found = frequency_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
-    _, true = signal.freqz(*system(), found.omega * PERIOD)
+    found = local_response(drive, drive, signal.lfilter(*system(), drive), PERIOD)
+    true = true_response(found)
     assert np.median(np.abs(found.response / true - 1.0)) < 1e-3
+
+
+NOISE = np.random.default_rng(0).standard_normal(20_000)
+
+
+@pytest.mark.parametrize("drive", [NOISE, np.repeat(NOISE[:200], 100)], ids=["noise", "steps"])
+def test_any_drive_shows_the_response(drive: Array) -> None:
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(drive))
+    moved = signal.lfilter([0.0, 0.3, -0.1], [1.0, -0.8, 0.2], drive) + noise
+    found = local_response(drive, drive, moved, PERIOD)
+    turn = 2.0 * np.pi * found.frequency * PERIOD
+    error = np.abs(found.response - signal.freqz([0.0, 0.3, -0.1], [1.0, -0.8, 0.2], turn)[1])
+    clear = found.coherence > 0.9
+    assert np.count_nonzero(clear) > 10
+    assert np.sqrt(np.mean((error / found.deviation)[clear] ** 2)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_record_too_short_for_a_line_shows_none() -> None:
+    assert local_response(NOISE[:20], NOISE[:20], NOISE[:20], PERIOD).frequency.shape == (0,)
 
 
 def test_multisines_and_noise_are_no_sweeps() -> None:
-    assert not is_sweep(frequency_plan().x.voltage(np.arange(100_000.0)))
+    assert not is_sweep(whole(frequency_plan().x))
     assert not is_sweep(np.random.default_rng(0).standard_normal(10_000))
 
 

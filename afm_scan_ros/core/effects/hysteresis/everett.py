@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.converters import optional
+from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError, SampleError
 from afm_scan_ros.core.types import Array, by_value
@@ -127,17 +128,30 @@ class EverettSurface:
 
 
 def grown(values: Array, levels: Array, least: float) -> tuple[Array, float]:
-    """Mix E of ``values``, on evenly spaced ``levels`` (V), with that of no hysteresis.
+    """Return E that grows everywhere by a ``least`` slope (1), near ``values`` on ``levels`` (V).
 
-    Returns the mixture that grows everywhere by a ``least`` slope (1), and the share of the latter
-    in it; that is 0 where E grows so far itself.
+    Where the values do not grow, they become the middle between the least surface above them that
+    does and the greatest below. The second result is the share of a surface without hysteresis that
+    is mixed in; it is 0 where the values grow so far themselves.
     """
     inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
-    rises = np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
-    lowest = float(min(map(np.min, rises))) / half
+    lowest = float(min(map(np.min, _rises(values, inside)))) / half
+    if lowest >= least:
+        return values, 0.0
+    above = np.where(inside, values, -np.inf)
+    above = np.maximum.accumulate(np.maximum.accumulate(above, axis=0)[:, ::-1], axis=1)[:, ::-1]
+    below = np.where(inside, values, np.inf)
+    below = np.minimum.accumulate(np.minimum.accumulate(below[::-1], axis=0)[::-1], axis=1)
+    middle = np.where(inside, 0.5 * (above + np.maximum(below, 0.0)), 0.0)
+    lowest = float(min(map(np.min, _rises(middle, inside)))) / half
     share = float(max(least - lowest, 0.0) / (1.0 - min(lowest, least)))
     straight = np.tril(0.5 * (levels[:, np.newaxis] - levels))
-    return values + share * (straight - values), share
+    return middle + share * (straight - middle), share
+
+
+def _rises(values: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Changes of E from level to level, as alpha rises and as beta falls."""
+    return np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
 
 
 def evenly_spaced(surface: EverettSurface) -> EverettSurface:

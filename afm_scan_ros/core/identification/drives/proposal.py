@@ -12,8 +12,8 @@ from scipy import signal
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.creep.record import SHORTEST
 from afm_scan_ros.core.identification.drives.excitation import (
+    MOVES,
     FrequencyLines,
     Plan,
     creep_plan,
@@ -30,29 +30,31 @@ from afm_scan_ros.core.identification.drives.waveforms import (
     whole,
 )
 from afm_scan_ros.core.identification.records.kinds import recognised
-from afm_scan_ros.core.identification.vibration.spectra import is_periodic, repetition
+from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import Array
 
 BRIEF = 100
 """Parts of a hold of which the second is its beginning: what rings has decayed."""
+SHORTEST = 10.0
+"""Seconds that a hold must last to show creep beyond what rings."""
+TURNS, APART = 20, 0.01
+"""Levels at which a drive turns to show loops within loops, and their distance over its range."""
 DRIVEN = 1e4
 """Mean power of a drive's spectrum over the least that counts as driven."""
 
 
 @frozen
 class Coverage:
-    """What records at hand show: the longest hold (s), drive range (V) and frequency (Hz).
+    """What records at hand show: the longest hold (s) and the drive range (V) of loops.
 
-    ``spacing`` (Hz) is that of the waves, ``resonance`` the frequency (Hz) of the largest response
-    to them, ``gain`` m/V; ``fresh`` marks a record that is not fitted. ``creep`` is the
-    displacement at the end of the hold over that at its beginning.
+    ``resonance`` is the frequency (Hz) of the largest response to waves, ``gain`` m/V; ``fresh``
+    marks a record that may be held out: of motion as scans are, or a second one of loops. ``creep``
+    is the displacement at the end of the hold over that at its beginning.
     """
 
     hold: float = 0.0
     loops: float = 0.0
-    highest: float = 0.0
-    spacing: float = math.inf
     resonance: float | None = None
     gain: float | None = None
     fresh: bool = False
@@ -63,17 +65,16 @@ def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverag
     """What one axis of a record shows; drive (V) and displacement (m) both (n,)."""
     kind = recognised(drive)
     swing = float(np.ptp(drive))
-    gain = float(np.ptp(displacement)) / swing if swing else None
+    gain = float(np.polyfit(drive, displacement, 1)[0]) if swing else None
     if kind == "creep":
-        rest = _longest_rest(drive)
+        rest, gain = _longest_rest(drive), float(np.ptp(displacement)) / swing
         hold = sample_period * (rest.stop - rest.start)
         return Coverage(hold=hold, gain=gain, creep=_creep(displacement, rest))
-    if kind == "hysteresis":
-        return Coverage(loops=swing, gain=gain)
     if kind == "frequency":
-        highest, resonance = response_peak(drive, displacement, sample_period)
-        spacing = _spacing(drive, sample_period, resonance)
-        return Coverage(highest=highest, spacing=spacing, resonance=resonance)
+        return Coverage(resonance=response_peak(drive, displacement, sample_period)[1])
+    turns = np.unique(np.rint(drive[turning_points(drive)] / (APART * swing))) if swing else ()
+    if len(turns) >= TURNS:
+        return Coverage(loops=swing, gain=gain)
     return Coverage(fresh=swing > 0.0, gain=gain)
 
 
@@ -89,6 +90,11 @@ def known_from(model: ScannerModel) -> Coverage:
     return Coverage(resonance=resonance, gain=max(gains))
 
 
+def of_axes(parts: Sequence[Coverage]) -> Coverage:
+    """Coverage of one record by that of each of its axes."""
+    return evolve(combined(parts), fresh=any(part.fresh for part in parts))
+
+
 def combined(parts: Iterable[Coverage]) -> Coverage:
     """Coverage of several records together."""
     together = Coverage()
@@ -96,11 +102,9 @@ def combined(parts: Iterable[Coverage]) -> Coverage:
         together = Coverage(
             max(together.hold, part.hold),
             max(together.loops, part.loops),
-            max(together.highest, part.highest),
-            min(together.spacing, part.spacing),
             part.resonance or together.resonance,
             part.gain if part.loops >= together.loops and part.gain else together.gain,
-            together.fresh or part.fresh,
+            together.fresh or part.fresh or min(together.loops, part.loops) > 0.0,
             max(together.creep, part.creep),
         )
     return together
@@ -126,21 +130,6 @@ def _creep(displacement: Array, rest: slice) -> float:
     return max(1.0, late / early) if early else 1.0
 
 
-def _spacing(drive: Array, sample_period: float, frequency: float) -> float:
-    """Largest distance (Hz) between a drive's waves within a fifth of a frequency (Hz).
-
-    They are those of its second period, or, as of a sweep, of all of it.
-    """
-    columns = drive[:, np.newaxis]
-    period = repetition(columns) if is_periodic(columns) else 0
-    part = drive[period : 2 * period] if period else drive
-    spectrum = np.abs(np.fft.rfft(part))
-    lines = np.fft.rfftfreq(len(part), sample_period)
-    near = (lines > 0.8 * frequency) & (lines < 1.2 * frequency)
-    driven = lines[near & (spectrum > spectrum[near].max() / math.sqrt(DRIVEN))]
-    return float(np.diff(driven).max(initial=1.0 / (sample_period * len(part))))
-
-
 def response_peak(drive: Array, displacement: Array, sample_period: float) -> tuple[float, float]:
     """Highest frequency that waves drive, and that of the largest response, both Hz.
 
@@ -158,30 +147,28 @@ def response_peak(drive: Array, displacement: Array, sample_period: float) -> tu
     return float(frequencies[driven].max()), float(frequencies[response.argmax()])
 
 
-LINES_PER_RESONANCE = 200.0
-"""Lines below a resonance: two within the half-power width of one with a damping of 0.005."""
 SURVEY_LINES = 25.0
-"""The same of a survey, which is to find the resonance within a few per cent."""
-ABOVE_RESONANCE = 4.4
-"""Times the resonance up to which waves are needed: an inverse is designed up to there."""
+"""Lines below a resonance, which are to find it within a few per cent."""
 PER_PERIOD = 5.0
 """Samples of the shortest period that a wave may have."""
 DECADES = 100.0
 """Lowest resonance that is looked for below the highest frequency driven, where none is known."""
 SLOWEST_OF_HOLD = 0.57
 """Longest creep time constant that a hold separates from a drift, over its length."""
-RAMP_SECONDS = 0.8
-"""Of a ramp from saturation to saturation in the hysteresis record."""
-RAMP_SAMPLES = 16_000.0
-"""Samples of a ramp from saturation to saturation, which the averages of noise rest on."""
+RAISED_SECONDS = 0.08
+"""In which a drive rises to the middle of a range that is not about 0 V."""
+LEVELS_RATE = 40.0
+"""Samples of moves between levels a period of the resonance: their corners last half of one."""
 CREEP_SAMPLES = 1e5
 """Samples of a hold at most: creep is slow, and its noise is averaged."""
 MARGIN = 1.3
-"""Range of a drive over that of the scans. A scan turns round within its range, and reversal curves
-begin at saturation: the margin is the hysteresis' width, some 15 % of the range, and as much for
-what compensation adds."""
-TRIAL_LEVELS, TRIAL_WAVES, TRIAL_PERIODS = 3, 4, 3
-"""Of a trial: reversal levels, the waves of full size, and periods of each with its fades."""
+"""Range of a drive over that of the scans. A scan turns round within its range, and a drive's ends
+are saturation: the margin is the hysteresis' width, some 15 % of the range, and as much for what
+compensation adds."""
+TRIAL_MOVES, HELD_OUT_MOVES = 48, 80
+"""Moves between levels in a trial, and in the record that is held out."""
+TRIAL_PERIODS = 3
+"""Periods of a trial's waves, with their fades."""
 
 
 @frozen
@@ -240,14 +227,14 @@ class ProposedRecord:
 
 
 def propose(
-    converter: ConverterLimits, hold: float, scan_range: float, have: Coverage
+    converter: ConverterLimits, hold: float | None, scan_range: float, have: Coverage
 ) -> Sequence[ProposedRecord]:
-    """Records that are lacking for scans over ``scan_range`` (m) and creep of ``hold`` (s).
+    """Records that are lacking for scans over ``scan_range`` (m), and for creep of a ``hold`` (s).
 
-    Raises InputError where the range is beyond what the converter reaches, and for a hold that is
-    too short to show creep.
+    Without a hold no record of creep is asked for. Raises InputError where the range is beyond what
+    the converter reaches, and for a hold that is too short to show creep.
     """
-    if hold < SHORTEST:
+    if hold is not None and hold < SHORTEST:
         raise InputError(f"a hold of {hold:g} s shows no creep: hold for {SHORTEST:g} s at least")
     converter = _needed(converter, scan_range, have)
     return tuple(_lacking(converter, hold, have))
@@ -268,46 +255,42 @@ def _needed(converter: ConverterLimits, scan_range: float, have: Coverage) -> Co
     return evolve(converter, lower=share * converter.lower, upper=share * converter.upper)
 
 
-def _lacking(converter: ConverterLimits, hold: float, have: Coverage) -> Iterator[ProposedRecord]:
-    swing = converter.swing
-    yield from _frequency(converter, have)
-    if have.loops < 1.9 * swing:
-        rate = _divided(converter.rate, RAMP_SAMPLES / RAMP_SECONDS)
-        loops, trial = hysteresis_plan(swing, rate=rate), hysteresis_plan(swing, TRIAL_LEVELS, rate)
-        yield _record(converter, loops, trial, "hysteresis", 2.0 * swing)
-    if have.hold < hold:
+def _lacking(
+    converter: ConverterLimits, hold: float | None, have: Coverage
+) -> Iterator[ProposedRecord]:
+    if have.resonance is None:
+        highest = converter.rate / PER_PERIOD
+        waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
+        survey = evolve(frequency_plan(lines=waves), name="survey")
+        yield _record(converter, survey, _brief(survey), "resonance", highest)
+    else:
+        yield from _levels(converter, have.resonance, have)
+    if hold is not None and have.hold < hold:
         rate = _divided(converter.rate, CREEP_SAMPLES / hold)
         fast = max(rate, PER_PERIOD * (have.resonance or 0.0))
         steps = _steps(converter, hold, rate)
         trial = _steps(converter, SHORTEST, _divided(converter.rate, fast))
         yield ProposedRecord(steps, trial, "creep", SLOWEST_OF_HOLD * hold)
-    if not have.fresh and have.resonance is not None:
-        moves = validation_plan(0.9 * swing, (2, 3), converter.rate, have.resonance)
+
+
+def _levels(
+    converter: ConverterLimits, resonance: float, have: Coverage
+) -> Iterator[ProposedRecord]:
+    """Moves between random levels, to be fitted and to be held out."""
+    swing, rate = converter.swing, _divided(converter.rate, LEVELS_RATE * resonance)
+    if have.loops < 1.9 * swing:
+        moves, trial = (
+            hysteresis_plan(swing, rate, resonance, count) for count in (MOVES, TRIAL_MOVES)
+        )
+        yield _record(converter, moves, trial, "hysteresis", 2.0 * swing)
+    if not have.fresh:
+        moves = validation_plan(0.9 * swing, (2, 3), rate, resonance, HELD_OUT_MOVES)
         yield _record(converter, moves, moves, "error", 1.8 * swing)
 
 
-def _frequency(converter: ConverterLimits, have: Coverage) -> Iterator[ProposedRecord]:
-    """A survey, or, where the resonance is known, the waves that identify it."""
-    highest = converter.rate / PER_PERIOD
-    if have.resonance is None:
-        waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
-        survey = evolve(frequency_plan(lines=waves), name="survey")
-        yield _record(converter, survey, _brief(survey), "resonance", highest)
-        return
-    highest = min(highest, ABOVE_RESONANCE * have.resonance)
-    enough = 1.5 * have.resonance / LINES_PER_RESONANCE
-    if have.highest < 0.9 * highest or have.spacing > enough:
-        waves = _waves(converter, highest, have.resonance, LINES_PER_RESONANCE)
-        plan = frequency_plan(lines=waves)
-        yield _record(converter, plan, _brief(plan), "vibration", highest)
-
-
 def _brief(plan: Plan[Multisine]) -> Plan[Multisine]:
-    """The waves of full size, for few periods: each peaks elsewhere."""
-    x, y = (
-        evolve(axis, waves=axis.waves[:TRIAL_WAVES], repeats=TRIAL_PERIODS)
-        for axis in (plan.x, plan.y)
-    )
+    """The waves for few periods."""
+    x, y = (evolve(axis, repeats=TRIAL_PERIODS) for axis in (plan.x, plan.y))
     return Plan(plan.name, x, y)
 
 
@@ -335,7 +318,7 @@ def _waves(
     corner = 0.44 * lowest * period / converter.rate
     apart = np.sqrt(np.gradient(lines.astype(np.float64)))
     amplitudes = np.minimum(1.0, corner / lines) * apart
-    return FrequencyLines(converter.rate, period, lines, amplitudes, 0.375 * converter.swing)
+    return FrequencyLines(converter.rate, period, lines, amplitudes, converter.swing / 8.0)
 
 
 def _widening(
@@ -365,6 +348,5 @@ def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: ConverterLimits)
     """Drive about the converter's middle."""
     if converter.middle == 0.0:
         return Plan(plan.name, plan.x, plan.y)
-    seconds = 0.1 * RAMP_SECONDS
-    x, y = (Raised(wave, converter.middle, seconds) for wave in (plan.x, plan.y))
+    x, y = (Raised(wave, converter.middle, RAISED_SECONDS) for wave in (plan.x, plan.y))
     return Plan(plan.name, x, y)

@@ -8,15 +8,7 @@ import numpy as np
 from attrs import frozen
 from scipy.signal import hilbert
 
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import (
-    ON_SATURATION,
-    TURNS,
-    ReversalCurves,
-    reversal_curves,
-)
-from afm_scan_ros.core.identification.vibration.frequency_response import is_sweep
-from afm_scan_ros.core.identification.vibration.spectra import is_periodic
+from afm_scan_ros.core.identification.records.periods import is_periodic
 from afm_scan_ros.core.types import Array
 
 RESTING = 0.5
@@ -25,6 +17,8 @@ HOLD = 0.005
 """Share of the record that a hold lasts at least: the steps of a converter are shorter."""
 STEP = 0.1
 """A move that lasts less than this share of a hold beside it is a step."""
+SINGLE = 0.1
+"""Share of its frequency by which a sweep's envelope changes, at most."""
 SWEPT = 1.5
 """Ratio of the highest to the lowest frequency from which a sine sweeps."""
 BROAD, MOST = 0.05, 0.5
@@ -46,7 +40,7 @@ MOVE = "move"
 class Stretch:
     """Samples ``first`` up to ``last`` of a drive, and their kind.
 
-    It is rest, steps, multisine, sweep, noise, reversal_curves, loops or scan.
+    It is rest, steps, multisine, sweep, noise, loops or scan.
     """
 
     kind: str
@@ -60,17 +54,16 @@ class Stretch:
 
 
 def recognised(drive: Array) -> str | None:
-    """Return what a drive (V), (n,), is for: creep, frequency, hysteresis, or None of these.
+    """Return what a drive (V), (n,), is for: creep, frequency, or None of these.
 
-    Steps between holds show creep, a multisine, a sweep or noise the frequency response, reversal
-    curves hysteresis. Of several, the one that lasts longest counts; rests do not.
+    Steps between holds show creep, a multisine, a sweep or noise the frequency response. Of
+    several, the one that lasts longest counts; rests do not.
     """
     purposes = {
         "steps": "creep",
         "multisine": "frequency",
         "sweep": "frequency",
         "noise": "frequency",
-        "reversal_curves": "hysteresis",
     }
     found = [stretch for stretch in stretches(drive) if stretch.kind != "rest"]
     if not found:
@@ -80,27 +73,12 @@ def recognised(drive: Array) -> str | None:
 
 def stretches(drive: Array) -> tuple[Stretch, ...]:
     """Cut a drive (V), (n,), into stretches of one kind each, in order and without gaps."""
-    moves = np.mean(np.diff(drive) == 0.0) <= RESTING and not _sweeps(drive)
-    if moves and (curves := _curves(drive)) is not None:
-        curved = [Stretch("reversal_curves", 0, curves.end)]
-        loops = [Stretch("loops", curves.end, len(drive))] * (curves.end < len(drive))
-        return tuple(curved + loops)
     return tuple(
         Stretch(_kind(drive[part.first : part.last]), part.first, part.last)
         if part.kind == MOVE
         else part
         for part in _stepping(_parts(drive))
     )
-
-
-def _curves(drive: Array) -> ReversalCurves | None:
-    try:
-        curves = reversal_curves(drive)
-    except InputError:
-        return None
-    turns = np.sort(drive[np.concatenate([curves.falling, curves.rising])[:, 0]])
-    apart = np.diff(turns) > ON_SATURATION * np.ptp(drive)
-    return curves if int(np.count_nonzero(apart)) + 1 >= TURNS else None
 
 
 def _parts(drive: Array) -> list[Stretch]:
@@ -141,6 +119,14 @@ def _kind(drive: Array) -> str:
         return "scan" if _has_one_rate(drive) else "multisine"
     random = _is_binary(drive) or (_bends(drive) and _fills_a_band(drive))
     return "noise" if random else "loops"
+
+
+def is_sweep(drive: Array) -> bool:
+    """Whether a drive, (n,), is a single sine at a time, its envelope slow beside it."""
+    analytic = hilbert(drive - drive.mean())
+    envelope = np.abs(analytic)
+    turning = np.abs(np.diff(analytic))
+    return bool(np.abs(np.diff(envelope)).sum() < SINGLE * turning.sum())
 
 
 def _sweeps(drive: Array) -> bool:

@@ -11,7 +11,6 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import detrend
 from scipy.stats import t as student
 
-from afm_scan_ros.core.identification.hysteresis.reversal_curves import turning_points
 from afm_scan_ros.core.least_squares import NORMAL_95
 from afm_scan_ros.core.types import Array, Trace
 
@@ -174,10 +173,6 @@ FAR = 0.5
 """Share of the drive's range that a branch covers whose slopes are compared."""
 SLOW = 0.9
 """Correlation of drive and displacement from which a record is slow enough to have slopes."""
-SHORT, CLEAR = 0.01, 5.0
-"""Shortfall of a motion at an end, over its range and over its usual error, that is reported."""
-NORMAL = 1.4826
-"""Standard deviation of normal noise over the median of its size."""
 
 
 def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterator[str]:
@@ -187,7 +182,8 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
     has no memory. Hysteresis bends the two ways apart: it flattens one at most, and loses heat only
     where the other is the steeper. So the steeper way counts, beside the mean slope of the same
     branches. Branches are compared that cover much of the range, as every branch is flat, or
-    steep, where it has just turned. A drive of few steps has no slopes, a ramp but one end.
+    steep, where it has just turned. A drive of few steps has no slopes, a ramp but one end. Where
+    the displacement goes against its drive the stage follows late, or rings.
     """
     slow = np.corrcoef(drive, displacement)[0, 1] > SLOW
     if not slow or np.mean(np.diff(drive) != 0.0) < 0.5:  # noqa: PLR2004 - most of the time
@@ -195,7 +191,7 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
     near = END * np.ptp(drive)
     for end, there in (("top", drive > drive.max() - near), ("bottom", drive < drive.min() + near)):
         slopes = _slopes(drive, displacement, there)
-        if slopes and max(slopes) < FLAT:
+        if slopes and max(map(abs, slopes)) < FLAT:
             yield (
                 f"{axis} saturates: at the {end} of its drive it moves less than {FLAT:.0%} as far"
                 f" per volt as elsewhere; record it with less than {np.ptp(drive):.3g} V peak to"
@@ -237,17 +233,8 @@ def _most(ways: Array, noise: float) -> float:
     return slope + float(student.ppf(0.975, len(ways) - 1)) * error
 
 
-def shortfalls(expected: Array, found: Array) -> Sequence[tuple[str, float]]:
-    """Ends of a motion, both (n,), at which less of it is found than expected, and how much less.
-
-    That is the mean in the last twentieth of its range, over the range.
-    """
-    extent, error = float(np.ptp(expected)), found - expected
-    detected = []
-    for end, sign in (("top", 1.0), ("bottom", -1.0)):
-        outward = sign * expected
-        there = outward > outward.max() - END * extent
-        short = -sign * float(np.mean(error[there]))
-        if short > max(SHORT * extent, CLEAR * NORMAL * float(np.median(np.abs(error)))):
-            detected.append((end, short / extent))
-    return detected
+def turning_points(drive: Array) -> NDArray[np.int64]:
+    """Samples where the drive turns round, the first of each where it pauses there."""
+    moving = np.flatnonzero(np.diff(drive))
+    rising = np.diff(drive)[moving] > 0.0
+    return np.asarray(moving[:-1][rising[:-1] != rising[1:]] + 1, dtype=np.int64)

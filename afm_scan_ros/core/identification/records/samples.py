@@ -197,8 +197,13 @@ def _unread(axis: str, displacement: Array, equal: float) -> Iterator[str]:
 
 
 def _equal_at_rest(drive: Array, displacement: Array) -> float:
-    """Share of the readings that equal the one before while the drive rests; 1 if unknown."""
+    """Share of the readings that equal the one before while the drive rests; 1 if unknown.
+
+    It is that of the rest before the first move, if there is one, as creep follows a move.
+    """
     resting = np.diff(drive) == 0.0
+    before = np.logical_and.accumulate(resting)
+    resting = before if np.count_nonzero(before) >= FEWEST else resting
     if np.count_nonzero(resting) < FEWEST:
         return 1.0
     return float(np.mean(np.diff(displacement)[resting] == 0.0))

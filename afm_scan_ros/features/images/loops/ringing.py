@@ -16,15 +16,15 @@ from scipy.signal import argrelmax
 from scipy.stats import f as fisher
 
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
-from afm_scan_ros.core.identification.vibration.line_response import transform
-from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
-from afm_scan_ros.core.identification.vibration.spectra import Complex
+from afm_scan_ros.core.identification.local_response import Complex, transform
 from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.moving import MovingRecord
 from afm_scan_ros.features.images.loops.search import LEVEL, jackknife, of_logarithm
 
+RESONANT = 0.5
+"""Damping ratio above which a pole is no resonance."""
 SEVERAL = 3
 """Records, or decays of one, from which on their disagreement gives the error."""
 WIDTH = 0.3

@@ -9,11 +9,10 @@ import numpy as np
 from attrs import evolve
 from scipy.signal import argrelmin
 
-from afm_scan_ros.core.identification.vibration.rational_fit import RESONANT
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept
-from afm_scan_ros.features.images.loops.ringing import Ringing, mode_intervals, mode_of
+from afm_scan_ros.features.images.loops.ringing import RESONANT, Ringing, mode_intervals, mode_of
 from afm_scan_ros.features.images.loops.search import Densities, Form, Found, search
 
 RATIO = 1.06

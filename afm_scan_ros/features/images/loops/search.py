@@ -19,7 +19,7 @@ from scipy.stats import t as student
 
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.identification.vibration.rational_fit import correlated
+from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
@@ -196,7 +196,7 @@ def _serves(residual: Array, without: Array, numbers: int) -> bool:
 
     Residuals that neighbouring rows have in common count once.
     """
-    count = len(residual) / correlated(residual.astype(np.complex128))
+    count = len(residual) / correlation_length(residual)
     gain = count * np.log((without @ without) / (residual @ residual))
     return bool(gain > numbers * np.log(count))
 

@@ -87,8 +87,8 @@ class Study:
     @property
     def fitted(self) -> float:
         """Rms misfit, m, to all data fitted."""
-        left = self.model.fit.together["x"].left
-        return float(np.sqrt(np.mean(np.square(list(left.values())))))
+        left = np.concatenate([one.left for one in self.model.fit.axes["x"].records])
+        return float(np.sqrt(np.mean(left**2)))
 
     @cached_property
     def twin(self) -> Model:
