@@ -22,7 +22,6 @@ from afm_scan_ros.report.style import (
     ORANGE,
     blank,
     dense,
-    legend_above,
     styled,
 )
 
@@ -32,8 +31,10 @@ COHERENCE = 0.9
 """Least coherence of a measured line that is drawn."""
 POINTS = 400
 """Points of a model's curve."""
-HELD = np.geomspace(0.01, 1e4, POINTS)
-"""Seconds since a step at which creep is drawn."""
+DRAWN = 1e-7
+"""Least rms of a band that is drawn, over the largest displacement."""
+HALF_TURN = 180.0
+"""Degrees from one point to the next at which a curve of the phase is cut."""
 
 Draw = Callable[[Axes, FittedAxis], None]
 
@@ -77,7 +78,7 @@ def _response(model: AxisModel, frequency: Array, sample_period: float) -> Compl
 def _magnitude(panel: Axes, found: FittedAxis) -> None:
     _responses(panel, found, lambda response: MICRO * np.abs(response))
     panel.set(yscale="log", ylabel="response to F in µm/V")
-    legend_above(panel, columns=3)
+    panel.legend(fontsize=8, loc="lower left", markerscale=4.0)
 
 
 def _phase(panel: Axes, found: FittedAxis) -> None:
@@ -102,15 +103,17 @@ def _responses(panel: Axes, found: FittedAxis, of: Callable[[Complex], Array]) -
     highest = 0.5 / shortest.sample_period
     lowest = min(float(r.response.frequency.min(initial=highest)) for r in found.records)
     frequency = np.geomspace(min(lowest, 0.01 * highest), highest, POINTS)
-    model = _response(found.model, frequency, shortest.sample_period)
-    panel.plot(frequency, of(model), color=BLUE, label="model")
+    curve = of(_response(found.model, frequency, shortest.sample_period))
+    turned = np.abs(np.diff(curve, prepend=curve[0])) > HALF_TURN
+    panel.plot(frequency, np.where(turned, np.nan, curve), color=BLUE, label="model")
     panel.set(xscale="log", xlabel="frequency in Hz")
 
 
 def _creep(panel: Axes, found: FittedAxis) -> None:
     creep = found.model.creep
-    grown = -np.expm1(-HELD[:, np.newaxis] / np.array(creep.time_constants))
-    panel.semilogx(HELD, 100.0 * grown @ np.array(creep.gains), color=BLUE)
+    held_for = np.geomspace(1e-4, 3.0, POINTS) * max(creep.time_constants, default=1.0)
+    grown = -np.expm1(-held_for[:, np.newaxis] / np.array(creep.time_constants))
+    panel.semilogx(held_for, 100.0 * grown @ np.array(creep.gains), color=BLUE)
     panel.set(xlabel="time since a step in s", ylabel="creep in % of the step")
 
 
@@ -130,7 +133,7 @@ def _left(panel: Axes, found: FittedAxis) -> None:
         share = np.linspace(0.0, 1.0, len(one.residual))
         dense(panel, share, NANO * one.residual, ORANGE, f"{one.record}, held out")
     panel.set(xlabel="time over the record's length", ylabel="measured less model, nm")
-    legend_above(panel, columns=2)
+    panel.legend(fontsize=8, loc="best")
 
 
 def _bands(panel: Axes, found: FittedAxis) -> None:
@@ -143,6 +146,7 @@ def _bands(panel: Axes, found: FittedAxis) -> None:
         }
         edges = np.maximum(known.bands, known.bands[1] / 10.0)
         for label, (rms, colour) in lines.items():
-            panel.stairs(NANO * np.array(rms), edges, color=colour, label=label)
+            shown = NANO * np.where(np.array(rms) > DRAWN * max(known.displacement), rms, np.nan)
+            panel.stairs(shown, edges, color=colour, label=label)
         panel.set(xlabel="frequency in Hz", ylabel="rms in nm", xscale="log", yscale="log")
         panel.legend(fontsize=8, loc="upper right")
