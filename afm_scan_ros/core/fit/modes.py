@@ -82,7 +82,19 @@ def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:
     settings, spectra = fit.layout.settings, _spectra(fit)
     free = fit.theta > fit.layout.lowest()
     every = _summits(fit, free, settings.mode_chance, most)
-    return [one for one in every if _seen(one, spectra, settings) and _excited(one, fit)]
+    some = [one for one in every if _seen(one, spectra, settings) and _excited(one, fit)]
+    return [one for one in some if _stands_out(one, fit)]
+
+
+def _stands_out(found: FoundMode, fit: AxisFit) -> bool:
+    """Whether a mode within the bandwidth of another is more than an error of that one's peak."""
+    peaks = [
+        float(np.hypot(real, imag)) / damping
+        for omega, damping, real, imag in fit.layout.of_modes(fit.theta)
+        if abs(found.mode[0] / omega - 1.0) < 2.0 * damping
+    ]
+    own = float(np.hypot(*found.mode[2:])) / found.mode[1]
+    return own > fit.layout.settings.least_peak * max(peaks, default=0.0)
 
 
 def _excited(found: FoundMode, fit: AxisFit) -> bool:

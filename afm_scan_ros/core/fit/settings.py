@@ -281,6 +281,12 @@ class FitSettings:
         "least share of the residuals in its band that a mode explains beside a smooth response",
         "seen on scanners made for tests: no derivation",
     )
+    least_peak: float = setting(
+        0.1,
+        "1",
+        "peak of a mode over that of another in whose bandwidth it lies, at least",
+        "what hysteresis does to a resonance is some per cent of its peak",
+    )
     excited_share: float = setting(
         0.01,
         "1",

@@ -8,7 +8,7 @@ from scipy import signal
 
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.modes import first_mode, further_modes
+from afm_scan_ros.core.fit.modes import add_first_mode, first_mode, further_modes
 from afm_scan_ros.core.fit.score_test import ScoreTest
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
@@ -164,3 +164,21 @@ def test_a_bend_of_the_response_is_no_mode() -> None:
     fit = AxisFit(*of_plays_alone(drive, moved))
     fit.weigh()
     assert next(iter(further_modes(fit)), None) is None
+
+
+@pytest.mark.parametrize(("peak", "seen"), [(0.03, 0), (0.5, 1)])
+def test_a_mode_within_another_s_bandwidth_is_no_error_of_its_peak(peak: float, seen: int) -> None:
+    """Hysteresis bends the peak of a resonance by some per cent, at its top."""
+    drive = 0.1 * waves()
+    moved = displaced(lambda volts: volts, drive)
+    sharp, omega = 0.2 * DAMPING, 2.0 * np.pi * 1.01 * FREQUENCY
+    system = [omega**2], [1.0, 2.0 * sharp * omega, omega**2]
+    above, below, _ = signal.cont2discrete(system, PERIOD)
+    weight = peak * sharp / DAMPING
+    moved += GAIN * weight * signal.lfilter(above.ravel(), below, drive)
+    moved += 1e-12 * np.random.default_rng(3).standard_normal(len(drive))
+    fit = AxisFit(*of_plays_alone(drive, moved))
+    fit.weigh()
+    add_first_mode(fit)
+    settle(fit, 20, ("lags", "modes", "creep"))
+    assert len(further_modes(fit)) == seen
