@@ -108,7 +108,7 @@ PURPOSES = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENT
 @click.option(
     "--travel",
     type=positive("m"),
-    help="Largest displacement from peak to peak.  [default: 1.3 times the range]",
+    help="Largest displacement from peak to peak.  [default: 1.4 times the range]",
 )
 @click.option(
     "--excitation",

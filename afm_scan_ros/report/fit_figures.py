@@ -31,8 +31,6 @@ COHERENCE = 0.9
 """Least coherence of a measured line that is drawn."""
 POINTS = 400
 """Points of a model's curve."""
-DRAWN = 1e-7
-"""Least rms of a band that is drawn, over the largest displacement."""
 HALF_TURN = 180.0
 """Degrees from one point to the next at which a curve of the phase is cut."""
 
@@ -146,7 +144,7 @@ def _bands(panel: Axes, found: FittedAxis) -> None:
         }
         edges = np.maximum(known.bands, known.bands[1] / 10.0)
         for label, (rms, colour) in lines.items():
-            shown = NANO * np.where(np.array(rms) > DRAWN * max(known.displacement), rms, np.nan)
+            shown = NANO * np.where(np.array(rms) >= min(known.noise), rms, np.nan)
             panel.stairs(shown, edges, color=colour, label=label)
         panel.set(xlabel="frequency in Hz", ylabel="rms in nm", xscale="log", yscale="log")
         panel.legend(fontsize=8, loc="upper right")

@@ -485,6 +485,12 @@ class FitSettings:
         "blocks of a record at least",
         "a record has hundreds of parameters",
     )
+    seen_lines: int = setting(
+        101,
+        "1",
+        "lines over which the power of a motion is averaged, to stand out of the noise",
+        "chance varies their mean by a tenth",
+    )
     told: float = setting(
         0.5,
         "1",

@@ -9,6 +9,7 @@ Creep is identified too where its interval excludes none.
 
 import numpy as np
 from attrs import evolve, frozen
+from scipy.ndimage import uniform_filter1d
 
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
@@ -161,8 +162,7 @@ def _opening(fit: AxisFit) -> tuple[float, Array]:
 
 def _vibration(known: Knowledge) -> EffectStatus:
     fit = known.fit
-    length = min(one.length for one in fit.records)
-    status = EffectStatus(drive=_range(fit), frequencies=(0.0, 0.5 / length))
+    status = EffectStatus(drive=_range(fit), frequencies=(0.0, _highest(fit)))
     if modes := fit.layout.of_modes(fit.theta):
         peaks = [np.hypot(real, imag) / damping for _, damping, real, imag in modes]
         return evolve(status, intervals=_of_mode(known, int(np.argmax(peaks))))
@@ -171,6 +171,21 @@ def _vibration(known: Knowledge) -> EffectStatus:
     if not known.tells(row) or lag < shortest:  # as samples are timed no better
         return unknown("frequency")
     return evolve(status, intervals=(known.interval("lag", "s", lag, row, 0.0),))
+
+
+def _highest(fit: AxisFit) -> float:
+    """Highest frequency (Hz) at which the motion of a record exceeds the sensor's noise."""
+    found = []
+    for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
+        moved = fit.gain * simulation.output[record.used]
+        window = np.hanning(len(moved))
+        power = np.abs(np.fft.rfft(window * (moved - moved.mean()))) ** 2
+        above = uniform_filter1d(
+            power, fit.layout.settings.seen_lines
+        ) > record.noise**2 / record.block * (window @ window)
+        last = len(above) - 1 - int(np.argmax(above[::-1]))
+        found.append(last / (len(moved) * record.length))
+    return float(max(found))
 
 
 def _of_mode(known: Knowledge, which: int) -> tuple[ParameterInterval, ...]:

@@ -10,8 +10,8 @@ from afm_scan_bench.scans import ALL, BENCH_SPEC, SEED, default_plant, rms_perce
 from afm_scan_ros.core.identification.drives.proposal import (
     ConverterLimits,
     Coverage,
-    combined,
     coverage,
+    of_axes,
     propose,
 )
 from afm_scan_ros.core.identification.identify import identify_records
@@ -20,7 +20,7 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.table import Row, Table
 
-HOLDS = (60.0, 300.0, 3000.0)
+HOLDS = (None, 300.0, 3000.0)
 CONVERTER = ConverterLimits(-4.0, 4.0, 50e3)
 RANGE = 40e-6
 TEN_MINUTES = evolve(
@@ -42,18 +42,18 @@ def measure() -> Table:
     return Table("planned", title, COLUMNS, rows)
 
 
-def _row(hold: float) -> Row:
+def _row(hold: float | None) -> Row:
     minutes, model = planned_model(hold)
     done = tracking(scan(TEN_MINUTES, ALL, model=model))
     x, y = rms_percent(done.x.constant_speed), rms_percent(done.y.trace)
-    return {"hold_s": hold, "minutes": minutes, "x_percent": x, "y_percent": y}
+    return {"hold_s": hold or 0.0, "minutes": minutes, "x_percent": x, "y_percent": y}
 
 
-def planned_model(hold: float) -> tuple[float, ScannerModel]:
+def planned_model(hold: float | None) -> tuple[float, ScannerModel]:
     """Minutes of record, and the model: a survey first, then what it shows to be lacking."""
     first = propose(CONVERTER, hold, RANGE, Coverage())[0]
     survey = record(first.plan, default_plant(), SEED)
-    proposed = propose(CONVERTER, hold, RANGE, combined([_covered(survey)]))
+    proposed = propose(CONVERTER, hold, RANGE, _covered(survey))
     plans = [each.plan for each in proposed]
     records = [evolve(record(plan, default_plant(), SEED), kind=plan.name) for plan in plans]
     seconds = first.seconds + sum(each.seconds for each in proposed)
@@ -61,4 +61,4 @@ def planned_model(hold: float) -> tuple[float, ScannerModel]:
 
 
 def _covered(found: Record) -> Coverage:
-    return combined(coverage(*found.signals(axis), found.sample_period) for axis in AXES)
+    return of_axes([coverage(*found.signals(axis), found.sample_period) for axis in AXES])

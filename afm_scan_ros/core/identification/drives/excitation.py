@@ -136,9 +136,9 @@ MOVES = 240
 """Moves between random levels: each fifth of a decade of speed has nineteen."""
 SPEEDS = 10.0, 3000.0
 """Of the slowest and the fastest move of the default drives, V/s."""
-RINGING = 8.0
+RINGING = 3.0
 """Periods of the resonance in which a move across the range excites it little; shorter ones are
-made smaller by the root of the ratio, so that what rings goes no farther than the slow moves."""
+made smaller by the root of the ratio, so that what rings goes little farther than slow moves."""
 
 
 def hysteresis_plan(

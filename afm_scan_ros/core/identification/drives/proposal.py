@@ -161,10 +161,10 @@ LEVELS_RATE = 40.0
 """Samples of moves between levels a period of the resonance: their corners last half of one."""
 CREEP_SAMPLES = 1e5
 """Samples of a hold at most: creep is slow, and its noise is averaged."""
-MARGIN = 1.3
+MARGIN = 1.4
 """Range of a drive over that of the scans. A scan turns round within its range, and a drive's ends
-are saturation: the margin is the hysteresis' width, some 15 % of the range, and as much for what
-compensation adds."""
+are saturation: the margin is the hysteresis' width, some 15 % of the range, as much for what
+compensation adds, and a tenth as a motion is seldom symmetric about rest."""
 TRIAL_MOVES, HELD_OUT_MOVES = 48, 80
 """Moves between levels in a trial, and in the record that is held out."""
 TRIAL_PERIODS = 3
