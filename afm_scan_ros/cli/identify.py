@@ -16,12 +16,9 @@ from afm_scan_ros.cli.options import (
     working,
 )
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
-from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.identification.fitted_axis import FittedAxis
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import Model
@@ -30,7 +27,6 @@ from afm_scan_ros.report.fit_page import fit_page
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.terminal import say
 
-TABLES = TableOptions()
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."
 
 
@@ -89,7 +85,7 @@ def identify(
     given = [tables.read(path) for path in records]
     if depolarised:
         given = [evolve(record, start="depolarised") for record in given]
-    given += [read_calibration(bag, kind, tables) for kind, bag in bags.items() if bag]
+    given += [evolve(tables.read(bag), kind=kind) for kind, bag in bags.items() if bag]
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
@@ -118,20 +114,6 @@ def _write_coupled(model: Model, out: Path) -> None:
         )
     model.save(out, HEADING)
     say(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
-
-
-def read_calibration(path: Path, kind: str, tables: TableOptions = TABLES) -> Record:
-    """Read a calibration record of a kind; a sine sweep is a frequency record too.
-
-    Raises InputError where it states another kind itself.
-    """
-    record = tables.read(path)
-    if record.kind is None:
-        return evolve(record, kind=kind)
-    if record.kind != kind and not (kind == "frequency" and record.kind in SWEEPS):
-        held = record.info.pattern if record.info else record.kind
-        raise InputError(f"{path}: holds a '{held}' record; give one of kind '{kind}'")
-    return record
 
 
 def _show(found: Identification) -> None:

@@ -171,11 +171,6 @@ def test_a_drive_and_displacement_of_unequal_length(refused: Refused, tmp_path: 
     assert "the last 3 samples are missing" in refused(bag)
 
 
-def test_a_record_of_another_kind(refused: Refused, tmp_path: Path) -> None:
-    bag = write(tmp_path / "frequency", GOOD, "frequency")
-    assert "give one of kind 'creep'" in refused(bag)
-
-
 def test_a_saturated_amplifier(refused: Refused, tmp_path: Path) -> None:
     limited = spoilt(
         "achieved_displacement",

@@ -7,10 +7,10 @@ import pytest
 from attrs import evolve
 from click.testing import CliRunner
 
+import afm_scan_ros as afm
 from afm_scan_ros.bag.writer import ScanWriter
-from afm_scan_ros.cli.identify import identify, read_calibration
+from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.drives.experiments import SWEEPS
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 
@@ -27,28 +27,33 @@ def write(folder: Path, info: ScanInfo, samples: int = 100) -> Path:
 
 
 def test_record_is_read_back(tmp_path: Path) -> None:
-    record = read_calibration(write(tmp_path / "bag", INFO), "creep")
+    record = afm.read_record(write(tmp_path / "bag", INFO))
     np.testing.assert_array_equal(record.drive, np.column_stack((RAMP, RAMP)))
     assert record.sample_period == INFO.sample_period
 
 
-def test_another_kind_of_record_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds a 'creep' record; give one of kind 'frequency'"):
-        read_calibration(write(tmp_path / "bag", INFO), "frequency")
+def test_a_record_of_any_kind_may_be_held_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An option names a record, whatever its bag says that it was made for."""
+    seen: list[tuple[str | None, str]] = []
 
+    def note(records: list[afm.Record], *_: object, **__: object) -> None:
+        seen.extend((each.kind, Path(each.name).name) for each in records)
+        raise InputError("seen")
 
-@pytest.mark.parametrize("sweep", SWEEPS)
-def test_a_sweep_is_a_frequency_record(tmp_path: Path, sweep: str) -> None:
-    bag = write(tmp_path / "bag", evolve(INFO, pattern=sweep))
-    assert read_calibration(bag, "frequency").kind == sweep
-    with pytest.raises(InputError, match=f"holds a '{sweep}' record; give one of kind 'creep'"):
-        read_calibration(bag, "creep")
+    monkeypatch.setattr("afm_scan_ros.identification.identify", note)
+    bags = [write(tmp_path / name, INFO) for name in ("fitted", "held_out")]
+    words = ["--frequency", str(bags[0]), "--validation", str(bags[1])]
+    with pytest.raises(InputError, match="seen"):
+        identify.main([*words, "--out", str(tmp_path / "model.yaml")], standalone_mode=False)
+    assert seen == [("frequency", "fitted"), ("validation", "held_out")]
 
 
 def test_a_sample_just_after_the_update_is_one_just_before(tmp_path: Path) -> None:
-    before = read_calibration(write(tmp_path / "before", INFO), "creep")
+    before = afm.read_record(write(tmp_path / "before", INFO))
     info = evolve(INFO, sampling_instant="after_update")
-    after = read_calibration(write(tmp_path / "after", info), "creep")
+    after = afm.read_record(write(tmp_path / "after", info))
     np.testing.assert_array_equal(after.drive, before.drive)
     np.testing.assert_array_equal(after.displacement, before.displacement)
 
@@ -56,7 +61,7 @@ def test_a_sample_just_after_the_update_is_one_just_before(tmp_path: Path) -> No
 def test_a_sample_at_a_distance_from_the_update_is_refused(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", evolve(INFO, trigger_offset=2e-4))
     with pytest.raises(InputError, match="s from the converter's update"):
-        read_calibration(bag, "creep")
+        afm.read_record(bag)
 
 
 @pytest.mark.parametrize("name", ["model.yaml", "model.npz", "model.fit.json", "model.fit.html"])
