@@ -11,7 +11,6 @@ from scipy.signal import cont2discrete, lfilter
 
 import afm_scan_ros as afm
 from afm_scan_ros.cli.identify import identify
-from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
 from helpers.fit_cases import of_bouc_wen
@@ -151,16 +150,10 @@ def test_curves_without_loops_want_a_validation_record_and_then_give_a_known_err
 
 
 @pytest.mark.evidence
-@pytest.mark.parametrize("seed", range(2))
-def test_slip_elements_and_a_cubic_are_no_refusal(seed: int, tmp_path: Path) -> None:
-    """Where the fits do not settle, what the message advises does it."""
+def test_slip_elements_and_a_cubic_are_no_refusal(tmp_path: Path) -> None:
     stage, out = Stage(hysteresis=slipping_and_bent), tmp_path / "model.yaml"
-    *fitted, check = written(tmp_path, calibration(), stage, seed)
-    words = [*fitted, "--validation", check]
-    done = run(words, out)
-    if isinstance(done.exception, ScanError):
-        assert "as --order 2 0" in str(done.exception)
-        done = run([*words, "--order", "2", "0"], out)
+    *fitted, check = written(tmp_path, calibration(), stage)
+    done = run([*fitted, "--validation", check], out)
     assert done.exit_code == 0, done.exception
     known = afm.load_model(out).scanner.axis("x").model_discrepancy
     assert known is not None
@@ -189,8 +182,7 @@ def test_axes_driven_one_after_the_other_are_both_identified(tmp_path: Path) -> 
 
 
 @pytest.mark.evidence
-def test_a_held_out_record_decides_between_fits_in_turns_and_of_all(tmp_path: Path) -> None:
-    """Bouc-Wen: in turns leaves 1.8 % of the waves, and all together err by 3 % on the check."""
+def test_a_scanner_of_one_state_is_told_from_plays(tmp_path: Path) -> None:
     *fitted, check = written(tmp_path, calibration(), Stage(hysteresis=of_bouc_wen))
     done = run([*fitted, "--validation", check], tmp_path / "model.yaml")
     assert done.exit_code == 0, done.exception
