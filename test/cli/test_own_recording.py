@@ -73,7 +73,7 @@ def test_the_drive_makes_the_scanner_follow(folder: Path) -> None:
 
 
 def test_without_a_held_step_an_offset_is_left(folder: Path) -> None:
-    """As the page states in nm: 33 rms in place of 12, and a shape within 5."""
+    """As the page states in nm: 30 rms, with the step too, and a shape within 5."""
     records = [afm.read_record(folder / f"{name}.csv") for name in ("waves", "moves")]
     path = 1e-6 * np.loadtxt(folder / "path.csv", delimiter=",", skiprows=1)[:, 1]
     drive = afm.identify(records).invert(path, 5e-5)
