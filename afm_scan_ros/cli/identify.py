@@ -125,7 +125,7 @@ def _show_axis(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
         say(f"{axis}: {effect}: {status_text(status)}")
     say(
-        f"   hysteresis by {found.operator}; a scan is predicted to {found.deviation:.2%} of its"
+        f"   hysteresis by {found.operator}; a scan is predicted to {100.0 * found.deviation:.2g}% of its"
         " range (standard deviation)"
     )
     for record in found.records:
