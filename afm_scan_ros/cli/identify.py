@@ -125,8 +125,8 @@ def _show_axis(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
         say(f"{axis}: {effect}: {status_text(status)}")
     say(
-        f"   hysteresis by {found.operator}; a scan is predicted to {100.0 * found.deviation:.2g}% of its"
-        " range (standard deviation)"
+        f"   hysteresis by {found.operator}; a scan is predicted to {100.0 * found.deviation:.2g}%"
+        " of its range (standard deviation)"
     )
     for record in found.records:
         say(f"   {record.name}, left by the model: {_text(record.misfit, 1e9, 'nm')}")
