@@ -17,7 +17,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
 from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.fit.simulation import at_rest
-from afm_scan_ros.core.fit.starts import begun_at_rest, left_out
+from afm_scan_ros.core.fit.starts import begun_at_rest, evidence_left_out
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback
 
@@ -61,7 +61,7 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
         return fit
     clear, name = fit.layout.settings.mode_chance, "rest before all records"
     resting = partial(begun_at_rest, fit, unknown)
-    other, lead = _compared(fit, resting, progress, name, groups, left_out(fit))
+    other, lead = _compared(fit, resting, progress, name, groups, evidence_left_out(fit))
     if lead > clear:
         return other
     for k in estimated if len(unknown) > 1 and lead < -clear else []:

@@ -134,6 +134,11 @@ class AxisFit:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
         return [residual for _, residual in self._without(self.theta, gathered=False)]
 
+    def motions(self) -> list[Array]:
+        """Motion (m) of the model in the blocks that count of each record."""
+        pairs = zip(self.records, self.simulated(self.theta), strict=True)
+        return [self.gain * simulation.output[record.used] for record, simulation in pairs]
+
     def gathered(self) -> list[Array]:
         """Residuals (m) of the stretches that count, as ``Signals.gathered``."""
         return [residual for _, residual in self._without(self.theta, gathered=True)]
@@ -282,9 +287,9 @@ class AxisFit:
         """
         settings, before = self.layout.settings, sum(len(one.tones) for one in self.records)
         lefts = list(self._with_tones())
-        for k, (record, left) in enumerate(zip(self.records, lefts, strict=True)):
+        triples = zip(self.records, lefts, self.motions(), strict=True)
+        for k, (record, left, motion) in enumerate(triples):
             drive = averaged(record.drive, record.block)[record.used]
-            motion = self.gain * self.simulated(self.theta)[k].output[record.used]
             found = find_tones(left, drive, motion, record.length, settings)
             self.records[k] = evolve(record, tones=()).with_tones(found, settings.tone_most)
         known = {tone for record in self.records for tone in record.tones}

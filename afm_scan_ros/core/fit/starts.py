@@ -27,7 +27,7 @@ def begun_at_rest(fit: AxisFit, places: Collection[int]) -> AxisFit:
     return AxisFit(layout, records, fit.gain, theta, fit.discrepancy, fit.scales)
 
 
-def left_out(fit: AxisFit) -> float:
+def evidence_left_out(fit: AxisFit) -> float:
     """Evidence (nat) of the samples that are left out as what came before them is unknown.
 
     It is the greatest that they can have: the model leaves no more of them than of the others, and

@@ -175,17 +175,21 @@ def _vibration(known: Knowledge) -> EffectStatus:
 
 def _highest(fit: AxisFit) -> float:
     """Highest frequency (Hz) at which the motion of a record exceeds the sensor's noise."""
-    found = []
-    for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
-        moved = fit.gain * simulation.output[record.used]
-        window = np.hanning(len(moved))
-        power = np.abs(np.fft.rfft(window * (moved - moved.mean()))) ** 2
-        above = uniform_filter1d(
-            power, fit.layout.settings.seen_lines
-        ) > record.noise**2 / record.block * (window @ window)
-        last = len(above) - 1 - int(np.argmax(above[::-1]))
-        found.append(last / (len(moved) * record.length))
-    return float(max(found))
+    found, lines = [0.0], fit.layout.settings.seen_lines
+    for record, motion in zip(fit.records, fit.motions(), strict=True):
+        above = uniform_filter1d(_power(motion), lines) > _noise_power(record, len(motion))
+        found.append(float(np.flatnonzero(above).max(initial=0)) / (len(motion) * record.length))
+    return max(found)
+
+
+def _power(signal: Array) -> Array:
+    """Power of a signal (m), (n,), in each bin under Hann's window."""
+    return np.abs(np.fft.rfft(np.hanning(len(signal)) * (signal - signal.mean()))) ** 2
+
+
+def _noise_power(record: Signals, count: int) -> float:
+    """Mean of that power of the sensor's noise in so many blocks of a record."""
+    return record.noise**2 / record.block * float(np.sum(np.hanning(count) ** 2))
 
 
 def _of_mode(known: Knowledge, which: int) -> tuple[ParameterInterval, ...]:
@@ -204,21 +208,18 @@ def _of_mode(known: Knowledge, which: int) -> tuple[ParameterInterval, ...]:
 
 
 def _missed_about(fit: AxisFit, omega: float, damping: float) -> float:
-    """Mean square of what is left beyond noise over the motion about a mode, by lines that tell.
+    """Variance of the logarithm of a mode's damping by what the model leaves about the mode.
 
-    Such errors at the lines of the motion, were they independent, move the damping by as large a
-    share, and the frequency by so much of the bandwidth.
+    It is the squared ratio of the residual, without noise, to the motion within the bandwidth,
+    divided by the number of lines of the motion there. Errors of such a size at these lines, were
+    they independent, move the damping by that ratio, and the frequency by the same share of the
+    bandwidth.
     """
     told, ends = 0.0, omega * np.array([1.0 - damping, 1.0 + damping]) / (2.0 * np.pi)
-    simulated = zip(fit.records, fit.residuals(), fit.simulated(fit.theta), strict=True)
-    for record, left, simulation in simulated:
-        moved = fit.gain * simulation.output[record.used]
-        window = np.hanning(len(moved))
-        both = (np.abs(np.fft.rfft(window * (each - each.mean()))) ** 2 for each in (left, moved))
+    for record, left, moved in zip(fit.records, fit.residuals(), fit.motions(), strict=True):
         band = slice(*np.searchsorted(np.fft.rfftfreq(len(moved), record.length), ends))
-        residual, motion = (power[band] for power in both)
-        noise = len(residual) * record.noise**2 / record.block * float(window @ window)
-        beyond = float(residual.sum()) - noise
+        residual, motion = (_power(each)[band] for each in (left, moved))
+        beyond = float(residual.sum()) - len(residual) * _noise_power(record, len(moved))
         if beyond > 0.0 and motion.any():
             told += float(motion.sum() ** 3 / (motion**2).sum()) / beyond
     return 1.0 / told if told > 0.0 else 0.0

@@ -26,19 +26,9 @@ def find_tones(
     of the drive that leaves little more over the drive than its neighbours: there the model may
     lack a mode.
     """
-    found: list[float] = []
-    window = np.hanning(len(residual))
-    limit = np.log(len(residual) / settings.tone_chance)
-    moved = motion - motion.mean()
-    error = float(np.std(residual) / max(np.std(motion), np.finfo(float).tiny))
-    moving = _power(moved, window)
-    owned = np.where(_lines(moving, limit, settings), moving, 0.0)
-    left = residual - residual.mean()
-    driven = _power(drive - drive.mean(), window)
-    owned = np.maximum(owned, _shared(driven, _power(left, window), limit, settings))
-    for one in _distorted(moved):
-        bent = settings.tone_loud * error**2 * _power(one, window)
-        owned = np.maximum(owned, np.where(_lines(bent, limit, settings), bent, 0.0))
+    found, left = list[float](), residual - residual.mean()
+    window, limit = np.hanning(len(left)), np.log(len(left) / settings.tone_chance)
+    owned = _owned(left, drive, motion, window, settings)
     while len(found) < settings.tone_most:
         power = _power(left, window)
         ratio = np.where(power < owned, 0.0, _over_mean(power))
@@ -79,6 +69,19 @@ def offered_tones(
         left = left - fitted[best]
         found.append(others.pop(best))
     return found
+
+
+def _owned(left: Array, drive: Array, motion: Array, window: Array, settings: FitSettings) -> Array:
+    """Power in each bin that is the model's: see ``find_tones``."""
+    limit, moved = np.log(len(left) / settings.tone_chance), motion - motion.mean()
+    error = float(np.std(left) / max(np.std(motion), np.finfo(float).tiny))
+    moving, driven = _power(moved, window), _power(drive - drive.mean(), window)
+    owned = np.where(_lines(moving, limit, settings), moving, 0.0)
+    owned = np.maximum(owned, _shared(driven, _power(left, window), limit, settings))
+    for one in _distorted(moved):
+        bent = settings.tone_loud * error**2 * _power(one, window)
+        owned = np.maximum(owned, np.where(_lines(bent, limit, settings), bent, 0.0))
+    return owned
 
 
 def _shared(driven: Array, power: Array, limit: float, settings: FitSettings) -> Array:

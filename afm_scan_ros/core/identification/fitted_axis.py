@@ -128,7 +128,10 @@ def _fitted_records(fit: AxisFit) -> Iterator[FittedRecord]:
 
 
 def _direct_misfit(model: AxisModel, drives: Sequence[Array]) -> Misfit:
-    """Error of the drives (V) that the direct inverse gives for what they make of F."""
+    """Error of the drives (V) that the direct inverse gives for what they make of F.
+
+    The F of one state may lie beyond the direct surface, whose end then counts.
+    """
     exact, surface = model.hysteresis.operator(), model.hysteresis.direct
     direct, errors = DirectInverse(surface), []
     for drive in drives:

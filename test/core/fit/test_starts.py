@@ -50,3 +50,29 @@ def test_a_first_step_from_rest_is_told_from_a_start_in_use(*, rested: bool) -> 
         moved = evolve(moved, displacement=whole[len(used) :, np.newaxis])
     fit = fit_axis([evolve(moved, start="unknown")], moved.axes[0])
     assert fit.records[0].rested == rested
+
+
+@pytest.mark.parametrize("rested", [True, False])
+def test_moves_to_both_ends_tell_whether_a_scanner_rested_before(*, rested: bool) -> None:
+    """The memory is known from the second end on; the way there shows a swing of 0.1 V before it."""
+    ends = np.interp(np.arange(1400), [0, 350, 1050, 1400], [0.0, 3.6, -3.6, 0.0])
+    drive = np.concatenate([ends, levels(2, 60, 400)])
+    moved = record(of_plays, drive)
+    if not rested:
+        used = np.concatenate(
+            [np.interp(np.arange(600), [0, 300, 600], [0.0, 0.1, 0.0]), np.zeros(20_000)]
+        )
+        remanence = displaced(of_plays, np.concatenate([used, drive]))[len(used) :]
+        remanence -= displaced(of_plays, drive)
+        moved = evolve(moved, displacement=moved.displacement + remanence[:, np.newaxis])
+    fit = fit_axis([evolve(moved, start="unknown")], moved.axes[0])
+    assert fit.records[0].rested == rested
+    assert (fit.records[0].first == 0) == rested
+
+
+def test_a_map_before_the_plays_moves_where_they_rest() -> None:
+    """That of these scanners is u + 0.01 u² and a cube: swings of u are about -0.01 u²."""
+    fit = fit_axis([record(of_plays, levels(1, 14, 600))], "x")
+    bias, _ = fit.layout.operator.bias(fit.theta[fit.layout.parts["rest"]])
+    expected = -0.01 * fit.layout.operator.half**2
+    assert bias == pytest.approx(expected, rel=0.4)

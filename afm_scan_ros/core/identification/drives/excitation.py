@@ -133,7 +133,7 @@ def frequency_plan(lines: FrequencyLines | None = None) -> Plan[Multisine]:
 
 
 MOVES = 240
-"""Moves between random levels: each fifth of a decade of speed has nineteen."""
+"""Moves between levels: 97 in each decade of speed."""
 SPEEDS = 10.0, 3000.0
 """Of the slowest and the fastest move of the default drives, V/s."""
 RINGING = 3.0
