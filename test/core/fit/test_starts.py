@@ -54,7 +54,7 @@ def test_a_first_step_from_rest_is_told_from_a_start_in_use(*, rested: bool) -> 
 
 @pytest.mark.parametrize("rested", [True, False])
 def test_moves_to_both_ends_tell_whether_a_scanner_rested_before(*, rested: bool) -> None:
-    """The memory is known from the second end on; the way there shows a swing of 0.1 V before it."""
+    """The memory is known from the second end on; the way there shows a swing of 0.1 V before."""
     ends = np.interp(np.arange(1400), [0, 350, 1050, 1400], [0.0, 3.6, -3.6, 0.0])
     drive = np.concatenate([ends, levels(2, 60, 400)])
     moved = record(of_plays, drive)
