@@ -1,15 +1,17 @@
 """Commands that scan by nodes, each a process: a scan whole, and refused before it moves."""
 
-import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import options
+from afm_scan_ros.cli.listening import ScanWatch
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
+from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.effects.scale import Scale
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -18,6 +20,7 @@ from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.nodes.flow import USUAL_WINDOW
+from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import BLOCKS
 from helpers.scaling import scaled_axis
 from helpers.viewers import assert_curves_are_recorded, assert_samples_are_of_the_streams
@@ -27,17 +30,31 @@ def files(spec: Path, bag: Path) -> ScanFiles:
     return ScanFiles(spec, CONFIG / "model.yaml", CONFIG / "plant.yaml", bag)
 
 
-def test_a_scan_is_recorded_whole_and_follows_what_was_desired(
-    spec: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def test_the_slowest_node_says_how_far_a_scan_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(options, "EVERY", 0.0)  # so that every step is told
+    with showing("a scan") as shown:
+        watch = ScanWatch(shown)
+        watch.meet(SimpleNamespace(total_samples=1000))
+        for node, state, sample in (
+            ("trajectory_generator", "waiting", 0),
+            ("scan_recorder", RUNNING, 0),
+            ("trajectory_generator", RUNNING, 700),
+            ("scan_recorder", RUNNING, 250),
+        ):
+            reported = {"node": node, "state": state, "next_sample": sample, "reason": ""}
+            watch.hear(SimpleNamespace(**reported))
+    assert capsys.readouterr().err.splitlines()[:4] == [
+        "a scan: trajectory_generator: waiting (0 s)",
+        "a scan: scan_recorder: running (0 s)",
+        "a scan: trajectory_generator: running (0 s)",
+        "a scan: 25%, sample 250 of 1000 (0 s)",
+    ]
+
+
+def test_a_scan_is_recorded_whole_and_follows_what_was_desired(spec: Path, tmp_path: Path) -> None:
     run_scan(files(spec, tmp_path / "bag"), ("creep", "hysteresis", "vibration"))
-    told = capsys.readouterr().err
-    assert f"scan to {tmp_path / 'bag'}: " in told
-    assert re.search(r": \d+%, sample \d+ of \d+ \(\d+ s\)\n", told)
     recording = read_scan(tmp_path / "bag")
     info = recording.info
     assert info.inverses == ("creep", "hysteresis", "vibration")

@@ -222,7 +222,7 @@ def test_the_ridge_integrates_over_the_parameters(seed: int) -> None:
     ridge, scaled = BaseRidge(list(base)), FREEDOM**0.5 * base
     rows = np.vstack((scaled.T, np.eye(3)))
     missed = np.append(FREEDOM**0.5 * left, np.zeros(3))
-    least = missed - rows @ np.linalg.lstsq(rows, missed)[0]
+    least = missed - rows @ np.linalg.lstsq(rows, missed, rcond=None)[0]
     assert FREEDOM * np.sum(ridge.left(left) ** 2) == pytest.approx(np.sum(least**2))
     seen = np.column_stack([ridge.left(each) for each in slopes.T])
     apart = np.eye(3) + scaled @ scaled.T

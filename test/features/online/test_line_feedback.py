@@ -172,7 +172,7 @@ def test_a_correction_changes_in_the_turn_around_alone_and_without_a_jump() -> N
         run = slice(where.start + line * len(time), where.start + (line + 1) * len(time))
         for name in AXES:
             correction = (followed.axis(name) - target.axis(name))[run][steady]
-            rest = correction - basis @ np.linalg.lstsq(basis, correction)[0]
+            rest = correction - basis @ np.linalg.lstsq(basis, correction, rcond=None)[0]
             np.testing.assert_allclose(rest, 0.0, atol=1e-18)
     moved = np.diff(followed.x - target.x)
     largest = np.ptp(followed.x - target.x)
