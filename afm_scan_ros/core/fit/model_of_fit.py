@@ -11,6 +11,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.starts import rest_of
 from afm_scan_ros.core.model import AxisModel, HysteresisModel
 
 
@@ -29,11 +30,11 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     layout, theta = fit.layout, fit.layout.of_operator(fit.theta)
     levels = layout.settings.direct_levels
     if isinstance(layout.operator, Plays):
-        bias, _ = layout.operator.bias(fit.theta[layout.parts["rest"]])
+        bias, _ = layout.operator.bias(rest_of(fit))
         surface = layout.operator.surface(theta, bias, mixed=True)
         surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
-    slopes = layout.operator.slopes(theta)
+    slopes = layout.operator.slopes(theta, rest_of(fit))
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
 
