@@ -182,8 +182,9 @@ NANOMETRES = {"suffix": "_nm", "scale": 1e-9}
 
 @frozen
 class _Sensor:
-    order: int
-    corner: float = field(metadata={"suffix": "_hz"})
+    order: int = 0
+    corner: float | None = field(default=None, metadata={"suffix": "_hz"})
+    delay: float = field(default=0.0, metadata={"suffix": "_s"})
 
 
 @frozen
