@@ -248,11 +248,13 @@ def with_one_state(fit: AxisFit) -> AxisFit:
 
     One state forgets where it began only little by little, at no turn of the drive, so each record
     that did not rest has a memory of its own. Where its path begins the plays do not say, for the
-    offset of a record is free: all begin as from rest. What vibrates is sought anew: it may have
-    taken what plays cannot do.
+    offset of a record is free: all begin as from rest. It follows each turn of the drive, so that
+    measured drives lose their noise. What vibrates is sought anew: it may have taken what plays
+    cannot do.
     """
     layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
-    records, resting = each_of_own_start(fit.records), begun_at_rest(fit, range(len(fit.records)))
+    quiet = [one.without_drive_noise(layout.operator.half, layout.settings) for one in fit.records]
+    records, resting = each_of_own_start(quiet), begun_at_rest(fit, range(len(fit.records)))
     for record, simulation in zip(records, resting.simulated(resting.theta), strict=True):
         both = record.drive, simulation.effective - rest
         drive, output = (averaged(one, record.block)[record.used] for one in both)

@@ -431,6 +431,25 @@ class FitSettings:
         "what averaging over blocks may remove, over the noise's variance",
         "a tenth of the information",
     )
+    drive_window: int = setting(
+        64,
+        "sample",
+        "length of the windows in which the noise of a measured drive is sought",
+        "few of them hold a jump or a turn, and a quarter of their lines tells two levels apart",
+    )
+    drive_flat: float = setting(
+        1.5,
+        "1",
+        "greatest ratio of a drive's power density from 3/4 to 7/8 of the Nyquist frequency over"
+        " that above, where it is noise",
+        "both are equal within 10 % in white noise; what a converter is given falls by more",
+    )
+    drive_turn: float = setting(
+        3.5,
+        "standard deviation of the drive's noise",
+        "least swing of a measured drive that is a turn",
+        "noise swings by as much in one of several thousand samples",
+    )
     smooth_window: int = setting(
         64,
         "1",

@@ -8,6 +8,7 @@ from attrs import evolve, frozen
 from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.measured_drive import without_noise
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
 from afm_scan_ros.core.types import Array
@@ -118,6 +119,13 @@ class Signals:
         )
         moved = evolve(self, drive=drive, edges=edges, first=first)
         return evolve(moved, late=samples, recorded=given)
+
+    def without_drive_noise(self, half_range: float, settings: FitSettings) -> "Signals":
+        """Return the record with its drive less the noise with which that was measured."""
+        given = self.drive if self.recorded is None else self.recorded
+        quiet = without_noise(given, half_range, settings)
+        late = np.concatenate([np.full(self.late, quiet[0]), quiet])[: len(quiet)]
+        return evolve(self, drive=late, recorded=quiet)
 
     def with_tones(self, tones: Iterable[float], most: int) -> "Signals":
         """Add tones (Hz), at most so many in all, but none within a bin of one that is there."""
