@@ -5,13 +5,16 @@ from attrs import evolve
 from scipy.optimize import nnls
 
 from afm_scan_ros.core.effects.base import Cascade
+from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.model import AxisModel, HysteresisModel
+from afm_scan_ros.core.model import AxisModel, HysteresisModel, HysteresisOperator
+from afm_scan_ros.core.spread import Variant
+from afm_scan_ros.core.types import Array
 
 
 def model_of(fit: AxisFit) -> AxisModel:
@@ -36,6 +39,34 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     slopes = layout.operator.slopes(theta)
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
+
+
+def variant_of(fit: AxisFit, move: Array, deviations: float) -> Variant:
+    """Return the effects at θ + ``deviations`` ``move``, with F = 0 at depolarised rest.
+
+    All variants of a fit have the same structure. Raises InputError where these are no effects.
+    """
+    layout, theta = fit.layout, fit.theta + deviations * move
+    dynamics, sensor = layout.dynamics(theta), layout.sensor_of(theta)
+    vibration, operator = dynamics.vibration(fit.gain), _coarse(fit, theta)
+    creep = CreepModel(dynamics.gains, dynamics.time_constants)
+    return Variant(*operator, vibration, creep, sensor, deviations)
+
+
+def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap | None]:
+    """Operator of ``spread_levels`` and the map behind it, as near θ as the model is to the fit."""
+    layout, settings = fit.layout, fit.layout.settings
+    plays = layout.operator
+    if not isinstance(plays, Plays):
+        return plays.slopes(layout.of_operator(theta)), None
+    levels = np.linspace(plays.lower, plays.upper, settings.spread_levels)
+    (fitted, _), (values, offset) = (
+        plays.everett(layout.of_operator(each), levels) for each in (fit.theta, theta)
+    )
+    values = values - fitted + grown(fitted, levels, settings.least_slope)[0]
+    bias, _ = plays.bias(theta[layout.parts["rest"]])
+    surface = EverettSurface(plays.lower, plays.upper, values, offset, bias)
+    return from_rest(surface, layout.map_of(theta))
 
 
 def from_rest(
