@@ -2,7 +2,7 @@
 
 import numpy as np
 from attrs import evolve
-from scipy.optimize import nnls
+from scipy.optimize import brentq, nnls
 
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.creep import CreepModel
@@ -34,11 +34,30 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     if isinstance(layout.operator, Plays):
         bias, _ = layout.operator.bias(fit.theta[layout.parts["rest"]])
         surface = layout.operator.surface(theta, bias, mixed=True)
+        rest = layout.operator.output(theta, np.zeros(1), layout.at_rest(fit.theta)[0])
+        surface = _resting(surface, float(rest[0]), layout.settings)
         surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
     slopes = layout.operator.slopes(theta)
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
+
+
+def _resting(surface: EverettSurface, rest: float, settings: FitSettings) -> EverettSurface:
+    """Return a surface whose bias lets it rest at an output (V), as the plays do that it is of.
+
+    With their own bias it would rest up to 1/5000 of the range elsewhere, as there are no loops
+    between its levels. Where no bias nearby does so it stays.
+    """
+
+    def apart(bias: float) -> float:
+        return float(Preisach(evolve(surface, bias=bias)).at_rest().now[1]) - rest
+
+    own, most = surface.bias or 0.0, 0.5 * settings.rest_bias * (surface.upper - surface.lower)
+    ends = own - most, own + most
+    if apart(ends[0]) * apart(ends[1]) >= 0.0:
+        return surface
+    return evolve(surface, bias=float(brentq(apart, *ends)))
 
 
 def variant_of(fit: AxisFit, move: Array, deviations: float) -> Variant:

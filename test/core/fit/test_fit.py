@@ -5,6 +5,7 @@ import pytest
 from attrs import evolve
 
 import afm_scan_ros as afm
+from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.alternatives import with_one_state
 from afm_scan_ros.core.fit.axis import fit_axis
@@ -66,6 +67,20 @@ def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
     of_model = cascade.apply(cascade.at_rest(), drive)[1]
     apart = of_model - GAIN * simulation.output
     assert np.abs(apart).max() < 1e-6 * np.ptp(of_model)
+
+
+@pytest.mark.parametrize("bias", [-0.8, 0.3])
+def test_the_model_rests_where_the_plays_do(bias: float) -> None:
+    drive = 0.6 * levels(4, 6, 300)
+    layout, records, gain, theta = of_plays_alone(drive, GAIN * drive)
+    theta[10:70] = 0.3
+    theta[layout.parts["rest"]] = bias * SETTINGS.rest_bias * LIMIT
+    of_model = model_of(AxisFit(layout, records, gain, theta)).hysteresis.surface
+    given, start = layout.of_operator(theta), layout.at_rest(theta)[0]
+    expected = layout.operator.output(given, np.zeros(1), start)[0]
+    plane = evolve(of_model, offset=layout.operator.surface(given).offset)
+    assert abs(expected) > 1e-3 * LIMIT
+    assert Preisach(plane).at_rest().now[1] == pytest.approx(expected, abs=1e-8 * LIMIT)
 
 
 def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
