@@ -18,6 +18,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
+from afm_scan_ros.core.fit.signals import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.model import AxisModel, band_edges
@@ -74,9 +75,12 @@ def _left_out(model: AxisModel, spread: Spread, one: HeldOut) -> MissedMotion:
     period, part = one.record.sample_period, slice(one.first, None)
     drive, displacement = one.record.signals(one.record.axes[0])
     explained = np.var(apart(model, spread, drive, period)[:, part], axis=1).sum()
-    error = float(np.linalg.norm(one.validation.model_discrepancy.rms)) ** 2
+    left = one.validation.residual[part]
+    error = float(np.var(left)) - noise_of(left) ** 2
     moved = rms_by_band(displacement[part], spread.bands, period)
-    return MissedMotion(moved, max(error - float(explained), 0.0) / float(np.var(displacement[part])))
+    return MissedMotion(
+        moved, max(error - float(explained), 0.0) / float(np.var(displacement[part]))
+    )
 
 
 def _by_band(records: Sequence[MissedMotion], otherwise: Array) -> Array:
