@@ -18,7 +18,7 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import variant_of
 from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals
-from afm_scan_ros.core.fit.simulation import simulate
+from afm_scan_ros.core.fit.simulation import Simulation, simulate
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
 
@@ -71,13 +71,19 @@ def scans(fit: AxisFit) -> Iterator[tuple[Array, float]]:
             yield np.clip(drive, operator.lower, operator.upper), period
 
 
-def _products(fit: AxisFit, drive: Array, period: float) -> Array:
-    """JᵀJ of a drive (V) from depolarised rest."""
+def from_rest(fit: AxisFit, drive: Array, period: float) -> Simulation:
+    """Simulate a drive (V), (n,), of a sample period (s) from depolarised rest."""
     edges, still = np.arange(len(drive) + 1), np.zeros(len(drive))
     given = "a scan", drive, still, period, 1, 0
     record = Signals(*given, rested=True, noise=0.0, edges=edges)
-    simulation = simulate(fit.layout, fit.theta, record)
+    return simulate(fit.layout, fit.theta, record)
+
+
+def _products(fit: AxisFit, drive: Array, period: float) -> Array:
+    """JᵀJ of a drive (V) from depolarised rest."""
+    simulation = from_rest(fit, drive, period)
     theta, (start, _) = fit.layout.of_operator(fit.theta), fit.layout.at_rest(fit.theta)
+    edges = simulation.record.edges
     pieces = fit.layout.operator.pieces(theta, drive, edges, start)
     rows = np.concatenate([one for _, one in jacobian(simulation, pieces)])
     rows -= rows[0].copy()

@@ -27,12 +27,14 @@ def of_records(fit: AxisFit) -> list[Array]:
 def information(fit: AxisFit, every: Iterable[Array]) -> Array:
     """H of the normal equations, of the H of ``every`` record.
 
-    A record varies by what the fit leaves of it, and samples whose residuals are alike are as one.
+    A record varies by what the fit leaves of it, or by its noise at least, and samples whose
+    residuals are alike are as one.
     """
     matrix = np.zeros((fit.layout.size,) * 2)
     for record, left, each in zip(fit.records, fit.residuals(), every, strict=True):
         alike = samples_alike(left, fit.layout.settings.residual_segments)
-        matrix += fit.variance(record) / (float(np.mean(left**2)) * alike) * each
+        own = max(float(np.mean(left**2)), record.noise**2 / record.block)
+        matrix += fit.variance(record) / (own * alike) * each
     return matrix
 
 

@@ -6,8 +6,9 @@ what the model misses beyond the sensor's noise n_k and beyond what its paramete
     (η_k m_k)² = e_k² - n_k² - Σ_i var((y_i - y_c) / d_i),
 
 and of one that was fitted what the fit leaves beyond noise. In each band η² is the mean of the
-records held out that move there, or else of those fitted, or else the largest; and the square of
-``least_discrepancy`` is added.
+records held out that move there, or else of those fitted, or else the largest. Added are the
+squares of ``least_discrepancy`` and of what the model loses of the fit's own scans from rest, but
+for their mean.
 """
 
 from collections.abc import Sequence
@@ -18,12 +19,15 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
+from afm_scan_ros.core.fit.directions import from_rest, scans
+from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.signals import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.model import AxisModel, band_edges
 from afm_scan_ros.core.prediction_error import apart
 from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array
 
@@ -57,7 +61,21 @@ def spread_of(known: Knowledge, model: AxisModel, held_out: Sequence[HeldOut]) -
     fitted = _fitted(known, bands)
     shares = _by_band(fitted, np.full(len(bands) - 1, max(one.squared for one in fitted)))
     shares = _by_band([_left_out(model, spread, one) for one in held_out], shares)
-    return evolve(spread, shares=np.sqrt(least**2 + shares))
+    return evolve(spread, shares=np.sqrt(least**2 + _lost(known.fit, model) + shares))
+
+
+def _lost(fit: AxisFit, model: AxisModel) -> float:
+    """Mean squared share by which scans of a model and of its fit differ, but for their mean.
+
+    The surface of a drive of one sign lacks the plays that only its first rise moves, and so does
+    the creep behind it. The last cycle counts.
+    """
+    lost, cycle = [], slice(-fit.layout.settings.scan_samples, None)
+    for drive, period in scans(fit):
+        cascade, own = forward(model, period), fit.gain * from_rest(fit, drive, period).output
+        apart_by = cascade.apply(cascade.at_rest(), drive)[1] - own
+        lost.append(np.var(apart_by[cycle]) / np.var(own[cycle]))
+    return float(np.mean(lost))
 
 
 def _fitted(known: Knowledge, bands: Sequence[float]) -> list[MissedMotion]:

@@ -7,13 +7,14 @@ from attrs import evolve
 import afm_scan_ros as afm
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
+from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.spread_of_fit import HeldOut, spread_of
 from afm_scan_ros.core.identification.validation import validate_from
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.prediction_error import apart
-from helpers.fit_cases import GAIN, PERIOD, levels, of_plays_alone
+from helpers.fit_cases import GAIN, LIMIT, PERIOD, levels, of_plays_alone
 
 NOISE = 1e-9
 
@@ -79,3 +80,22 @@ def test_the_deviation_grows_from_rest_on_and_with_the_motion(
     assert large.max() > 1.5 * large[0]
     np.testing.assert_allclose(large[0], np.sqrt(np.mean(small[:1] ** 2)) * 3.0, rtol=0.3)
     assert np.all(large < 0.01 * np.ptp(moved))
+
+
+@pytest.mark.parametrize(("lower", "lost"), [(-LIMIT, False), (0.0, True)])
+def test_what_the_surface_loses_of_the_fit_is_stated(lower: float, *, lost: bool) -> None:
+    """Of a drive of one sign it loses what only the first rise moves, and the creep of that."""
+    drive = np.clip(levels(4, 20, 600), lower, LIMIT)
+    layout, records, gain, _ = of_plays_alone(drive, GAIN * drive)
+    layout = evolve(layout, operator=Plays(lower, LIMIT))
+    theta = layout.start()
+    theta[1 : len(layout.operator.thresholds)] = 0.3
+    theta[layout.parts["creep"]] = 0.01
+    fit = AxisFit(layout, records, gain, theta)
+    (simulation,) = fit.simulated(theta)
+    noise = np.random.default_rng(5).normal(0.0, NOISE, len(drive))
+    exact = evolve(records[0], displacement=gain * simulation.output + noise)
+    fit = AxisFit(layout, [exact], gain, theta)
+    fit.weigh()
+    shares = spread_of(Knowledge.of(fit), model_of(fit), []).shares
+    assert (max(shares) > 3.0 * DEFAULT_SETTINGS.least_discrepancy) == lost
