@@ -17,7 +17,12 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
 from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.fit.simulation import at_rest
-from afm_scan_ros.core.fit.starts import begun_at_rest, evidence_left_out
+from afm_scan_ros.core.fit.starts import (
+    begun_at_rest,
+    counted_whole,
+    each_of_own_start,
+    evidence_left_out,
+)
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback
 
@@ -43,6 +48,7 @@ def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     other = _preferred(fit, partial(with_one_state, fit), progress, "one state")
     if other is fit:
         return fit
+    other = with_rest(counted_whole(other), progress)
     while add_mode(other):
         settle(other, other.layout.settings.most_steps, searching=True)
     return _with_any_sensor(other, progress)
@@ -222,12 +228,17 @@ def _held_with(fit: AxisFit, found: FoundMode) -> AxisFit:
 def with_one_state(fit: AxisFit) -> AxisFit:
     """Return the fit with the operator of one state that follows its F best.
 
-    What vibrates is sought anew: it may have taken what plays cannot do.
+    One state forgets where it began only little by little, at no turn of the drive, so each record
+    that did not rest has a memory of its own. Where its path begins the plays do not say, for the
+    offset of a record is free: all begin as from rest. What vibrates is sought anew: it may have
+    taken what plays cannot do.
     """
     layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
-    for record, simulation in zip(fit.records, fit.simulated(fit.theta), strict=True):
-        output = simulation.effective - rest
-        paths.append((averaged(record.drive, record.block), averaged(output, record.block)))
+    records, resting = each_of_own_start(fit.records), begun_at_rest(fit, range(len(fit.records)))
+    for record, simulation in zip(records, resting.simulated(resting.theta), strict=True):
+        both = record.drive, simulation.effective - rest
+        drive, output = (averaged(one, record.block)[record.used] for one in both)
+        paths.append((drive, output))
     low = min(float((output - drive).min()) for drive, output in paths)
     high = max(float((output - drive).max()) for drive, output in paths)
     margin = (
@@ -237,11 +248,11 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     operator = OneState(layout.operator.lower, layout.operator.upper, widths, layout.settings)
     linear = fit.theta[layout.parts["lags"].start : layout.parts["rest"].start]
     begun = np.array([output[0] - drive[0] for drive, output in paths])
-    memory = begun[[one.unknown is not None for one in fit.records]]
-    starts = [np.concatenate([one, linear, memory]) for one in operator.started(paths)]
-    other = AxisFit(
-        evolve(layout, operator=operator), list(fit.records), fit.gain, starts[0], fit.discrepancy
-    )
+    memory = begun[[not one.rested for one in records]]
+    tail = np.concatenate([linear, np.zeros(operator.rests), memory])
+    starts = [np.concatenate([one, tail]) for one in operator.started(paths)]
+    laid = evolve(layout, operator=operator, unknown_starts=len(memory))
+    other = AxisFit(laid, records, fit.gain, starts[0], fit.discrepancy)
     other.theta = min(starts, key=other.objective)
     other.lay_out(evolve(other.layout, modes=0))
     other.weigh()

@@ -19,6 +19,7 @@ from afm_scan_ros.core.fit.model_of_fit import variant_of
 from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.simulation import Simulation, simulate
+from afm_scan_ros.core.fit.starts import rest_of
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
 
@@ -72,21 +73,25 @@ def scans(fit: AxisFit) -> Iterator[tuple[Array, float]]:
 
 
 def from_rest(fit: AxisFit, drive: Array, period: float) -> Simulation:
-    """Simulate a drive (V), (n,), of a sample period (s) from depolarised rest."""
+    """Simulate a drive (V), (n,), of a sample period (s) from the depolarised rest of the model."""
+    theta = fit.theta.copy()
+    theta[fit.layout.parts["rest"]] = rest_of(fit)
     edges, still = np.arange(len(drive) + 1), np.zeros(len(drive))
     given = "a scan", drive, still, period, 1, 0
     record = Signals(*given, rested=True, noise=0.0, edges=edges)
-    return simulate(fit.layout, fit.theta, record)
+    return simulate(fit.layout, theta, record)
 
 
 def _products(fit: AxisFit, drive: Array, period: float) -> Array:
-    """JᵀJ of a drive (V) from depolarised rest."""
+    """JᵀJ of a drive (V) from depolarised rest, which counts as known where no record rested."""
     simulation = from_rest(fit, drive, period)
-    theta, (start, _) = fit.layout.of_operator(fit.theta), fit.layout.at_rest(fit.theta)
-    edges = simulation.record.edges
-    pieces = fit.layout.operator.pieces(theta, drive, edges, start)
+    operator, edges = fit.layout.operator, simulation.record.edges
+    start, _ = fit.layout.at_rest(simulation.theta)
+    pieces = operator.pieces(fit.layout.of_operator(fit.theta), drive, edges, start)
     rows = np.concatenate([one for _, one in jacobian(simulation, pieces)])
     rows -= rows[0].copy()
+    if not any(one.rested for one in fit.records):
+        rows[:, fit.layout.parts["rest"]] = 0.0
     return np.asarray(rows.T @ rows)
 
 

@@ -12,6 +12,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.starts import rest_of
 from afm_scan_ros.core.model import AxisModel, HysteresisModel, HysteresisOperator
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
@@ -32,13 +33,13 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     layout, theta = fit.layout, fit.layout.of_operator(fit.theta)
     levels = layout.settings.direct_levels
     if isinstance(layout.operator, Plays):
-        bias, _ = layout.operator.bias(fit.theta[layout.parts["rest"]])
+        bias, _ = layout.operator.bias(rest_of(fit))
         surface = layout.operator.surface(theta, bias, mixed=True)
-        rest = layout.operator.output(theta, np.zeros(1), layout.at_rest(fit.theta)[0])
+        rest = layout.operator.output(theta, np.zeros(1), layout.operator.at_rest(rest_of(fit))[0])
         surface = _resting(surface, float(rest[0]), layout.settings)
         surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
-    slopes = layout.operator.slopes(theta)
+    slopes = layout.operator.slopes(theta, rest_of(fit))
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
 
@@ -75,16 +76,15 @@ def variant_of(fit: AxisFit, move: Array, deviations: float) -> Variant:
 def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap | None]:
     """Operator of ``spread_levels`` and the map behind it, as near θ as the model is to the fit."""
     layout, settings = fit.layout, fit.layout.settings
-    plays = layout.operator
+    plays, given = layout.operator, layout.of_operator(theta)
+    rest = rest_of(AxisFit(layout, fit.records, fit.gain, theta))
     if not isinstance(plays, Plays):
-        return plays.slopes(layout.of_operator(theta)), None
+        return plays.slopes(given, rest), None
     levels = np.linspace(plays.lower, plays.upper, settings.spread_levels)
-    (fitted, _), (values, offset) = (
-        plays.everett(layout.of_operator(each), levels) for each in (fit.theta, theta)
-    )
+    fitted, _ = plays.everett(layout.of_operator(fit.theta), levels)
+    values, offset = plays.everett(given, levels)
     values = values - fitted + grown(fitted, levels, settings.least_slope)[0]
-    bias, _ = plays.bias(theta[layout.parts["rest"]])
-    surface = EverettSurface(plays.lower, plays.upper, values, offset, bias)
+    surface = EverettSurface(plays.lower, plays.upper, values, offset, plays.bias(rest)[0])
     return from_rest(surface, layout.map_of(theta))
 
 

@@ -83,15 +83,30 @@ class OneState:
         """Standard deviation of w (V) at an unknown start: anywhere between both ``widths``."""
         return np.array([(self.widths[1] - self.widths[0]) / np.sqrt(12.0)])
 
-    rests = 0
+    rests = 1
+    """Number of values that say where w lies at depolarised rest."""
 
     def expected_rest(self) -> Array:
-        """At depolarised rest nothing is unknown."""
-        return np.zeros(0)
+        """Standard deviation of w (V) at depolarised rest, (1,): what is 0 there is a convention.
 
-    def at_rest(self, _rest: Array) -> tuple[Array, Array]:
-        """Drive and w (V) at depolarised rest, (2,), and its derivatives by nothing, (2, 0)."""
-        return np.zeros(2), np.zeros((2, 0))
+        Where no record began at rest, any w may be added to that of all records.
+        """
+        return self.expected_memory()
+
+    def at_rest(self, rest: Array) -> tuple[Array, Array]:
+        """Drive and w (V) at depolarised rest, (2,), and the derivatives by that w, (2, 1)."""
+        return self.in_use(0.0, rest)
+
+    def depolarised(self, theta: Array) -> Array:
+        """W (V) at 0 V after the drive has alternated ever less, (1,): a value for ``at_rest``.
+
+        From the ends of the range on, to which the turns keep.
+        """
+        count = self.settings.direct_levels
+        sizes = np.linspace(max(-self.lower, self.upper), 0.0, count)
+        turns = np.clip(sizes * (-1.0) ** np.arange(count), self.lower, self.upper)
+        drive = np.interp(np.arange(count**2) / count, np.arange(count), turns)
+        return self.output(theta, np.append(drive, 0.0), np.zeros(2))[-1:]
 
     def in_use(self, drive: float, memory: Array) -> tuple[Array, Array]:
         """Drive and w (V), (2,), of a scanner in use, and the derivatives by its memory, (2, 1)."""
@@ -184,12 +199,13 @@ class OneState:
         inside = np.clip(states, knots[3], knots[count + 3])
         return np.asarray(BSpline.design_matrix(inside, knots, 3).toarray())
 
-    def slopes(self, theta: Array) -> DuhemSlopes:
-        """Return the effect's parameters."""
+    def slopes(self, theta: Array, rest: Array) -> DuhemSlopes:
+        """Return the effect's parameters, for w (V) at depolarised rest, (1,), where F is 0."""
         rising, falling = 1.0 + theta.reshape(self.shape)
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper
-        return DuhemSlopes(*ends, self.lower, 0.0, self.widths, slope, rising, falling)
+        offset = self.lower - float(rest[0])
+        return DuhemSlopes(*ends, offset, 0.0, self.widths, slope, rising, falling)
 
 
 def _third(size: int) -> Array:

@@ -209,6 +209,10 @@ class Plays:
         changes = slope * (moved * inside)[:, np.newaxis]
         return np.clip(moved * bias, -limits, limits), changes
 
+    def depolarised(self, _theta: Array) -> Array:
+        """Return a value for ``at_rest``, (1,): no bias, where no record began at rest."""
+        return np.zeros(1)
+
     def in_use(self, drive: float, memory: Array) -> tuple[Array, Array]:
         """Plays (V) of a scanner in use, and their derivatives by its memory, (plays, unknowns).
 

@@ -1,11 +1,14 @@
-"""A fit in which records begin at depolarised rest in place of a start that nobody knows."""
+"""Fits in which records begin at depolarised rest, or each from a start of its own."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from itertools import count
 
 import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.types import Array
 
 
 def begun_at_rest(fit: AxisFit, places: Collection[int]) -> AxisFit:
@@ -24,7 +27,27 @@ def begun_at_rest(fit: AxisFit, places: Collection[int]) -> AxisFit:
         records.append(changed)
     layout = evolve(fit.layout, unknown_starts=len(memories) - 1)
     theta = np.concatenate([fit.theta[: layout.parts["memory"].start], *memories])
+    theta[layout.parts["rest"]] = rest_of(fit)
     return AxisFit(layout, records, fit.gain, theta, fit.discrepancy, fit.scales)
+
+
+def rest_of(fit: AxisFit) -> Array:
+    """Where a fit's operator lies at depolarised rest, in θ: as records, or else itself, tell."""
+    if any(one.rested for one in fit.records):
+        return fit.theta[fit.layout.parts["rest"]]
+    return fit.layout.operator.depolarised(fit.layout.of_operator(fit.theta))
+
+
+def each_of_own_start(records: Sequence[Signals]) -> list[Signals]:
+    """Return records of which each that did not begin at rest has an unknown start of its own."""
+    places = count()
+    return [one if one.rested else evolve(one, unknown=next(places)) for one in records]
+
+
+def counted_whole(fit: AxisFit) -> AxisFit:
+    """Return a fit of which each record counts from its first sample on."""
+    records = [evolve(one, first=0) for one in fit.records]
+    return AxisFit(fit.layout, records, fit.gain, fit.theta, fit.discrepancy, fit.scales)
 
 
 def evidence_left_out(fit: AxisFit) -> float:
@@ -36,14 +59,14 @@ def evidence_left_out(fit: AxisFit) -> float:
     early = [k for k, one in enumerate(fit.records) if one.first]
     places = {k: place for place, k in enumerate(early)}
     records = [evolve(one, first=0, unknown=places.get(k)) for k, one in enumerate(fit.records)]
-    count, operator = len(early), fit.layout.operator
-    layout = evolve(fit.layout, unknown_starts=count)
+    operator = fit.layout.operator
+    layout = evolve(fit.layout, unknown_starts=len(early))
     kept = fit.theta[: layout.parts["memory"].start]
-    theta = np.concatenate([kept, np.zeros(count * operator.unknowns)])
+    theta = np.concatenate([kept, np.zeros(len(early) * operator.unknowns)])
     whole = AxisFit(layout, records, fit.gain, theta, fit.discrepancy, fit.scales)
     memory = layout.parts["memory"]
     matrix = whole.normal(with_operator=False)[0][memory, memory]
-    expected = np.tile(operator.expected_memory(), count)
+    expected = np.tile(operator.expected_memory(), len(early))
     volume = np.linalg.slogdet(np.eye(len(expected)) + expected[:, np.newaxis] * matrix * expected)
     lost = 0.0
     for all_of_it, one, left in zip(records, fit.records, fit.residuals(), strict=True):
