@@ -77,8 +77,12 @@ class Knowledge:
         return closed(name, (max(value - half, least), value + half), unit)
 
     def variants(self) -> tuple[Variant, tuple[Variant, ...]]:
-        """Return the fit's own effects, and those in each direction of what is not known."""
-        return variants(self.fit, self.wider, self.every)
+        """Return the fit's own effects, and those in each direction of what is not known.
+
+        Where the records do not tell the hysteresis, nor do they tell the scales of its prior.
+        """
+        told = _hysteresis(self).status is not Status.UNKNOWN
+        return variants(self.fit, self.wider if told else self.widest, self.every)
 
     def effects(self) -> BaseEffects:
         """How each effect is known, over which drive, frequencies and hold times."""

@@ -8,8 +8,10 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.fit.directions import principal, scans, variants
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of, variant_of
+from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.spread_of_fit import spread_of
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.prediction_error import apart
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import GAIN, PERIOD, SETTINGS, levels, of_plays_alone, signals
@@ -43,6 +45,20 @@ def test_more_records_leave_less_unknown() -> None:
     )
     assert 0.6 * one < two < 0.95 * one
     assert 0.6 * two < four < 0.95 * two
+
+
+def test_hysteresis_that_no_record_tells_is_as_uncertain_as_beforehand() -> None:
+    drive = np.repeat([0.0, 0.5, 1.0, 0.4], 500)
+    noise = np.random.default_rng(4).normal(0.0, 1e-8, len(drive))
+    layout, records, gain, theta = of_plays_alone(drive, GAIN * np.append(0.0, drive[:-1]) + noise)
+    fit = AxisFit(layout, records, gain, theta, scales=dict.fromkeys(SEARCHED, 0.001))
+    fit.weigh()
+    known, model = Knowledge.of(fit), model_of(fit)
+    assert known.effects().hysteresis.status is Status.UNKNOWN
+    of_model = spread_of(known, model, [])
+    moved = np.linalg.norm(apart(model, of_model, FRESH, PERIOD))
+    own = evolve(of_model, directions=variants(fit, known.posterior, known.every)[1])
+    assert moved > 3.0 * np.linalg.norm(apart(model, own, FRESH, PERIOD))
 
 
 def test_all_directions_are_the_covariance() -> None:
