@@ -84,7 +84,7 @@ def test_the_model_rests_where_the_plays_do(bias: float) -> None:
 
 
 def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
-    """Against the spread of the responses of parameters that are drawn from the posterior."""
+    """Against small parts of the responses of parameters that are drawn; the loop is unknown."""
     drive = levels(4, 6, 300)
     noise = np.random.default_rng(5).normal(0.0, 1e-8, len(drive))
     fit = AxisFit(*of_plays_alone(drive, GAIN * drive + noise))
@@ -93,10 +93,11 @@ def test_a_prediction_is_as_uncertain_as_its_parameters() -> None:
     stated = np.linalg.norm(apart(model, spread_of(known, model, []), fresh, PERIOD), axis=0)
     one = signals(fresh, fresh, 1)
     rng, drawn = np.random.default_rng(6), []
-    for theta in rng.multivariate_normal(fit.theta, known.wider, 200):
+    for theta in rng.multivariate_normal(fit.theta, 0.01 * known.widest, 200):
         response = simulate(fit.layout, theta, one).output
-        drawn.append(fit.gain * (response - response[0]))
-    np.testing.assert_allclose(np.std(drawn, axis=0)[100:], stated[100:], rtol=0.3)
+        drawn.append(fit.gain / 0.1 * (response - response[0]))
+    found, room = np.std(drawn, axis=0)[100:], 0.05 * stated.max()
+    np.testing.assert_allclose(found, stated[100:], rtol=0.2, atol=room)
     assert stated[0] == 0.0
 
 
