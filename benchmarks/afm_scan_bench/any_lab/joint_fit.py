@@ -2,8 +2,8 @@
 
 Each scanner is of the family and its records of the protocol whose turn it is, as in ``any_lab``.
 The error of the x axis is against the true displacement of a triangle over 0.6 of the driven range,
-at a rate that no record has. Its mean does not count in the error nor in the standard deviation that
-the model states, but is given as the offset.
+at a rate that no record has. Its mean counts neither in the error nor in the standard deviation
+that is stated, but is given as the offset.
 """
 
 import time
