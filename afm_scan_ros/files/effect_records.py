@@ -86,8 +86,9 @@ class CreepRecord:
 class SensorRecord:
     """A SensorModel."""
 
-    order: int
-    corner: float = field(metadata={"suffix": "_hz"})
+    order: int = 0
+    corner: float | None = field(default=None, metadata={"suffix": "_hz"})
+    delay: float = field(default=0.0, metadata={"suffix": "_s"})
 
 
 def hysteresis_from(given: HysteresisRecord, arrays: Archive) -> HysteresisModel:

@@ -56,6 +56,15 @@ def _(one: found.SensorLowPass) -> str:
 
 
 @finding_text.register
+def _(one: found.LateReading) -> str:
+    return (
+        f"The displacement is {1e3 * one.delay:.4g} ms late, as of a converter's or a control box's"
+        " buffer. The model predicts what is read, and its inverse leaves the delay alone, as if it"
+        " were the sensor's: where the drive is late, so is the motion, by as much."
+    )
+
+
+@finding_text.register
 def _(one: found.Hum) -> str:
     lines = ", ".join(f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in one.lines)
     return (

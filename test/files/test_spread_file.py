@@ -44,7 +44,7 @@ def variant(part: float, deviations: float, *, duhem: bool) -> Variant:
         mapped,
         VibrationModel((8e-6 * 2850.0**2 * (1.0 + part),), (1.0, 60.0, 2850.0**2)),
         CreepModel((0.1 + part, -0.05), (2.0, 70.0)),
-        SensorModel(2, 300.0 * (1.0 + part)),
+        SensorModel(2, 300.0 * (1.0 + part), 2e-3 * (1.0 + part)),
         deviations,
     )
 

@@ -1,8 +1,10 @@
-"""The sensor's own low-pass: what is read of the displacement, and no part of the motion.
+"""The measuring chain: what is read of the displacement, when, and no part of the motion.
 
 A Butterworth filter of an even order n and a corner ω_c has poles on a circle of that radius,
 
-    M(s) = Π_k 1 / (1 - s / p_k),    p_k = ω_c exp(jπ/2 + jπ (2k - 1) / (2n)),    k = 1 … n.
+    M(s) = e^{-sτ} Π_k 1 / (1 - s / p_k),    p_k = ω_c exp(jπ/2 + jπ (2k - 1) / (2n)),    k = 1 … n,
+
+and the delay τ is that of converters and buffers, whether before the stage or behind its sensor.
 
 It is part of what a model predicts a sensor to read, and is never inverted. Source: S. Butterworth,
 Experimental Wireless and the Wireless Engineer 7 (1930) 536.
@@ -10,6 +12,7 @@ Experimental Wireless and the Wireless Engineer 7 (1930) 536.
 
 import numpy as np
 from attrs import field, frozen
+from attrs.converters import optional
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
@@ -18,26 +21,40 @@ from afm_scan_ros.core.errors import InputError
 
 @frozen
 class SensorModel:
-    """A low-pass of an even ``order`` and a ``corner`` (Hz).
+    """A low-pass of an even ``order`` and a ``corner`` (Hz), and a ``delay`` (s).
 
-    Raises InputError where the order is odd, or either is not positive.
+    An order of zero is none, without a corner. Raises InputError where the order is odd or
+    negative, the corner not positive, or the delay negative.
     """
 
-    order: int = field(converter=int)
-    corner: float = field(converter=float)
+    order: int = field(default=0, converter=int)
+    corner: float | None = field(default=None, converter=optional(float))
+    delay: float = field(default=0.0, converter=float)
 
     def __attrs_post_init__(self) -> None:
-        if self.order < 2 or self.order % 2 or not self.corner > 0.0:  # noqa: PLR2004 - a pair
+        none, corner = self.order == 0 and self.corner is None, self.corner or 0.0
+        if not none and (self.order < 2 or self.order % 2 or not 0.0 < corner < np.inf):  # noqa: PLR2004 - a pair
             raise InputError(
-                f"the sensor's low-pass has order {self.order} and corner {self.corner:g} Hz: give"
+                f"the sensor's low-pass has order {self.order} and corner {corner:g} Hz: give"
                 " an even order and a positive corner"
             )
+        if not 0.0 <= self.delay < np.inf:
+            raise InputError(f"the sensor's delay is {self.delay:g} s: give one of zero or more")
+
+    def __str__(self) -> str:
+        """Its low-pass and its delay, as far as it has them."""
+        parts = []
+        if self.corner is not None:
+            parts.append(f"a low-pass of order {self.order} at {self.corner:.4g} Hz")
+        if self.delay:
+            parts.append(f"a delay of {self.delay:.4g} s")
+        return " and ".join(parts)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles above the real axis (rad/s), shape (order / 2,)."""
         turns = 0.5 + (2.0 * np.arange(1, self.order // 2 + 1) - 1.0) / (2.0 * self.order)
-        return np.asarray(2.0 * np.pi * self.corner * np.exp(1j * np.pi * turns))
+        return np.asarray(2.0 * np.pi * (self.corner or 0.0) * np.exp(1j * np.pi * turns))
 
     @property
     def weights(self) -> NDArray[np.complex128]:
@@ -52,4 +69,5 @@ class SensorModel:
         poles = np.concatenate([self.poles, self.poles.conj()])
         low_pass = np.poly(poles).real / np.prod(-poles).real
         denominator = np.polymul(vibration.denominator, low_pass)
-        return VibrationModel(vibration.numerator, tuple(denominator), vibration.delay)
+        delay = vibration.delay + self.delay
+        return VibrationModel(vibration.numerator, tuple(denominator), delay)

@@ -19,9 +19,11 @@ from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.fit.simulation import at_rest
 from afm_scan_ros.core.fit.starts import (
     begun_at_rest,
+    by_whole_samples,
     counted_whole,
     each_of_own_start,
     evidence_left_out,
+    read_late,
 )
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback
@@ -77,17 +79,23 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
 
 
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
-    """Return a fit, or one with a low-pass of the sensor that has clearly the greater evidence.
+    """Return a fit, or one with a sensor of its own that has clearly the greater evidence.
 
-    A steeper one is tried where the last was better, and not enough. None is where only noise is
-    left, or hardly more of records that show a mode: what a low-pass leaves of slower records is
-    slight, and large at other rates.
+    A steeper low-pass and a delay are tried beside the sensor so far, and a delay in its place.
+    None is where only noise is left, or hardly more of records that show a mode: what a low-pass
+    leaves of slower records is slight, and large at other rates.
     """
-    for order in range(2, fit.layout.settings.steepest_sensor + 1, 2):
-        if fit.at_noise or (fit.sufficient and fit.layout.modes > 0):
+    while not (fit.at_noise or (fit.sufficient and fit.layout.modes > 0)):
+        order, delayed = fit.layout.sensor_order, fit.layout.delayed
+        sensors = {(order + 2, delayed), (order, True), (0, True)} - {(order, delayed)}
+        steepest = fit.layout.settings.steepest_sensor
+        every = [with_sensor(fit, n, delayed=d) for n, d in sorted(sensors) if n <= steepest]
+        some = [one for one in every if one is not None]
+        if not some:
             break
-        before, name = fit, f"a sensor's low-pass of order {order}"
-        fit = _preferred(fit, partial(with_sensor, fit, order), progress, name)
+        other = min(some, key=lambda one: one.discrepancy)
+        before, sensor = fit, other.layout.sensor_of(other.theta)
+        fit = _preferred(fit, partial(read_late, other), progress, f"a measuring chain, {sensor},")
         if fit is before:
             break
     return fit
@@ -160,46 +168,56 @@ def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str], handicap: float) 
     return lead
 
 
-def with_sensor(fit: AxisFit, order: int) -> AxisFit | None:
-    """Return the fit with a sensor's low-pass that lags as much as its vibration as read does.
+def with_sensor(fit: AxisFit, order: int, *, delayed: bool = False) -> AxisFit | None:
+    """Return the fit with a sensor that lags as much as its vibration as read does.
 
-    It takes the place of the lags. Where the fit has no mode, one that the sensor hid is sought.
-    Returns None where nothing lags, or where the low-pass explains hardly anything of what is left
-    while the operator is held.
+    Its low-pass is of an ``order``, or none. It takes the place of the lags. Where the fit has no
+    mode, one that the sensor hid is sought. Returns None where nothing lags, or where the sensor
+    explains hardly anything of what is left while the operator is held.
     """
     settings, read = fit.layout.settings, fit.layout.dynamics(fit.theta).read()
-    unit = SensorModel(order, 1.0)
+    unit = SensorModel(order, 1.0 if order else None)
     lag, of_unit = (-float(np.sum((b.weights / b.poles).real)) for b in (read, unit))
     corner = of_unit / max(lag, np.finfo(float).tiny)
-    if corner > 0.5 / min(one.period for one in fit.records):
+    if lag <= 0.0 or corner > 0.5 / min(one.period for one in fit.records):
         return None
-    laid = evolve(fit.layout, sensor_order=order)
+    laid = evolve(fit.layout, sensor_order=order, delayed=delayed)
     other = AxisFit(laid, list(fit.records), fit.gain, laid.start(), fit.discrepancy)
     for name in (*fit.layout.operator.parts, "map", "modes", "creep", "rest", "memory"):
         other.theta[laid.parts[name]] = fit.theta[fit.layout.parts[name]]
     other.theta[laid.parts["lags"].start] = 1.0 - sum(mode[2] for mode in laid.of_modes(fit.theta))
-    other.theta[laid.parts["sensor"]] = np.log(corner)
-    other.weigh()
+    delay = fit.layout.delay_of(fit.theta) + (0.0 if order else lag)
+    chain = [np.log(corner)] if order else []
+    other.theta[laid.parts["sensor"]] = [*chain, delay] if delayed else chain
     enough = np.sqrt(1.0 - settings.mode_share) * fit.discrepancy
-    _settle_while_hopeful(other, enough if laid.modes else np.inf)
-    if laid.modes == 0:
-        every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
-        other = min([other, *every], key=lambda each: each.discrepancy)
+    try:
+        hopeful = partial(_settled_while_hopeful, enough=enough if laid.modes else np.inf)
+        other = hopeful(other)
+        if delayed:
+            every = [other, *map(hopeful, by_whole_samples(other))]
+            other = min(every, key=lambda each: each.discrepancy)
+        if laid.modes == 0:
+            every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
+            other = min([other, *every], key=lambda each: each.discrepancy)
+    except ScanError:
+        return None
     return other if other.discrepancy < enough else None
 
 
-def _settle_while_hopeful(fit: AxisFit, enough: float) -> None:
-    """Settle all but the operator, as long as η may fall below what is ``enough``.
+def _settled_while_hopeful(fit: AxisFit, enough: float) -> AxisFit:
+    """Return a fit, all but its operator settled as long as η may fall below what is ``enough``.
 
     The squares of the residuals may fall by ``decided`` times as much as the last step foresaw.
     """
     settings = fit.layout.settings
     for _ in range(settings.most_steps // settings.stage_steps):
+        fit = read_late(fit)
         settle(fit, settings.stage_steps, LINEAR)
         falls = settings.decided * fit.remaining / fit.misfit(fit.theta)
         hopeless = fit.discrepancy * np.sqrt(max(0.0, 1.0 - falls)) > enough
         if hopeless or fit.converged or fit.stalled:
             break
+    return read_late(fit)
 
 
 def _refitted(fit: AxisFit, found: FoundMode) -> AxisFit:

@@ -52,7 +52,7 @@ def add(fit: AxisFit, found: FoundMode) -> None:
         settings, omega = fit.layout.settings, found.mode[0]
         laid = layout_of(fit.layout.operator, longest, shortest, settings, omega)
         now = fit.layout
-        fit.lay_out(evolve(laid, unknown_starts=now.unknown_starts, sensor_order=now.sensor_order))
+        fit.lay_out(evolve(now, lags=laid.lags, time_constants=laid.time_constants))
     fit.add(found.mode)
 
 

@@ -44,7 +44,8 @@ class Layout:
 
     ``lags`` (s), of which the first is faster than any record shows, and creep's
     ``time_constants`` (s) have fixed places. Last come where depolarised rest is, and what each
-    record of an unknown start remembers.
+    record of an unknown start remembers. Where the sensor is ``delayed``, it is by ``least_delay``
+    (s) at least.
     """
 
     operator: Operator
@@ -54,6 +55,8 @@ class Layout:
     modes: int = 0
     unknown_starts: int = 0
     sensor_order: int = 0
+    delayed: bool = False
+    least_delay: float = 0.0
 
     @cached_property
     def parts(self) -> Mapping[str, slice]:
@@ -64,7 +67,7 @@ class Layout:
             "lags": len(self.lags),
             "modes": 4 * self.modes,
             "creep": len(self.time_constants),
-            "sensor": 1 if self.sensor_order else 0,
+            "sensor": (1 if self.sensor_order else 0) + (1 if self.delayed else 0),
             "rest": self.operator.rests,
             "memory": self.unknown_starts * self.operator.unknowns,
         }
@@ -134,6 +137,8 @@ class Layout:
         sharpest = -np.log(self.settings.greatest_damping)
         result[self.parts["modes"]] = np.tile([-np.inf, sharpest, -np.inf, -np.inf], self.modes)
         result[self.parts["creep"]] = 0.0
+        if self.delayed:
+            result[self.parts["sensor"].stop - 1] = self.least_delay
         return result
 
     @cached_property
@@ -166,10 +171,15 @@ class Layout:
         )
 
     def sensor_of(self, theta: Array) -> SensorModel | None:
-        """Return the sensor's low-pass, of which θ holds the logarithm of the corner (Hz)."""
-        if not self.sensor_order:
+        """Return the sensor, of which θ holds the logarithm of the corner in Hz, and the delay."""
+        if not (self.sensor_order or self.delayed):
             return None
-        return SensorModel(self.sensor_order, float(np.exp(theta[self.parts["sensor"]][0])))
+        corner = float(np.exp(theta[self.parts["sensor"].start])) if self.sensor_order else None
+        return SensorModel(self.sensor_order, corner, self.delay_of(theta))
+
+    def delay_of(self, theta: Array) -> float:
+        """Return the delay of the sensor, s."""
+        return float(theta[self.parts["sensor"].stop - 1]) if self.delayed else 0.0
 
     def with_mode(self, theta: Array, mode: Mode) -> tuple["Layout", Array]:
         """Add a mode, at the expense of the fastest lag."""
@@ -199,8 +209,9 @@ class Layout:
         """Precision of the prior, and its mean, shapes (size, size) and (size,).
 
         The frequency of a mode and the sensor's corner are those of ``theta`` within a factor of e,
-        the damping is that of the settings within the same factor, one standard deviation each. All
-        weights of V add up to one, which only fixes how the gain is shared with the operator.
+        the damping is that of the settings within the same factor, and a delay is that of ``theta``
+        within the slowest lag, one standard deviation each. All weights of V add up to one, which
+        only fixes how the gain is shared with the operator.
         """
         parts, s = self.parts, self.settings
         groups = [self.operator.precision(name, scales) for name in self.operator.parts]
@@ -213,6 +224,7 @@ class Layout:
         bent = np.diff(np.eye(len(self.time_constants)), 2, axis=0)
         groups.append((bent.T @ bent + 0.1 * np.eye(bent.shape[1])) / scales["creep"] ** 2)
         groups.append(np.eye(1 if self.sensor_order else 0))
+        groups.append(np.eye(1 if self.delayed else 0) / self.lags[-1] ** 2)
         groups.append(np.diag(self.operator.expected_rest() ** -2.0))
         groups += self.unknown_starts * [np.diag(self.operator.expected_memory() ** -2.0)]
         matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)

@@ -8,7 +8,7 @@ The same holds for the derivatives d by a pole, of which d[k + 1] = z (d[k] + T 
 """
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.compiled import regrouped
 from afm_scan_ros.core.fit.dynamics import Complex, PoleBank, States
@@ -41,8 +41,13 @@ class Response:
         return States(modes, changes, lags, late)
 
 
-def respond(dynamics: PoleBank, period: float, inputs: Array, settled: float) -> Response:
-    """Response to inputs (n,), of a scanner that has settled under the input ``settled``."""
+def respond(
+    dynamics: PoleBank, period: float, inputs: Array, settled: float, late: float = 0.0
+) -> Response:
+    """Response to inputs (n,), of a scanner that has settled under the input ``settled``.
+
+    The output alone is read ``late`` (s).
+    """
     dynamics = dynamics.read()
     modes, lags, creep = _decays(dynamics, period)
     fast, whole, count = np.zeros(len(inputs)), np.array([0, len(inputs)], np.intp), dynamics.modes
@@ -50,7 +55,29 @@ def respond(dynamics: PoleBank, period: float, inputs: Array, settled: float) ->
     _of_lags(lags, dynamics.weights[count:].real.copy(), settled, inputs, whole, fast)
     output, begun = fast.copy(), settled * float(dynamics.weights.real.sum())
     _of_lags(creep, dynamics.gains, begun, fast, whole, output)
-    return Response(dynamics, period, inputs, settled, fast, output)
+    response = Response(dynamics, period, inputs, settled, fast, output)
+    return evolve(response, output=_read_late(response, late)) if late else response
+
+
+def _read_late(response: Response, late: float) -> Array:
+    """Output (n,) as it was some time (s) before each sample.
+
+    A part f of a sample before t[k] a state is z^(1 - f) x[k - 1] + (1 - z^(1 - f)) v[k - 1].
+    """
+    dynamics, period, output = response.dynamics, response.period, response.output
+    whole, part = divmod(late / period, 1.0)
+    samples = int(whole)
+    if part:
+        samples, decays = samples + 1, np.exp(dynamics.poles * period * (1.0 - part))
+        passed = float(np.sum(dynamics.weights * (1.0 - decays)).real)
+        weights = dynamics.weights * decays
+        later, ends = passed * response.inputs, np.array([0, len(output)], np.intp)
+        modes, lags, _ = _decays(dynamics, period)
+        given = response.settled, response.inputs, ends, later
+        _of_modes(modes, weights, period, *given)
+        _of_lags(lags, weights[dynamics.modes :].real.copy(), *given)
+        output = output + later - response.fast
+    return np.concatenate([np.full(samples, response.output[0]), output])[: len(output)]
 
 
 def _decays(dynamics: PoleBank, period: float) -> tuple[Complex, Array, Array]:

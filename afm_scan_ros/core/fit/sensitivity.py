@@ -37,7 +37,7 @@ def jacobian(
             result[:, memory] = one[rows.start - first :, count:]
             result[:, vibration] = simulation.vibration[rows]
             result[:, parts["creep"]] = late[rows]
-            result[:, parts["sensor"]] = simulation.corner[rows]
+            result[:, parts["sensor"]] = simulation.sensed[rows]
             place = slice(rows.start - used.start, last - used.start)
             result *= record.weights[place, np.newaxis]
             yield place, result
@@ -56,7 +56,7 @@ def pulled(simulation: Simulation, pieces: Iterable[Columns] | None, pull: Array
     result = np.zeros((layout.size, pull.shape[1]))
     result[parts["lags"].start : parts["modes"].stop] = simulation.vibration.T @ whole
     result[parts["creep"]] = simulation.states.late.T @ whole
-    result[parts["sensor"]] = simulation.corner.T @ whole
+    result[parts["sensor"]] = simulation.sensed.T @ whole
     if pieces is not None:
         bank, first = simulation.dynamics.parallel(), 0
         through = StretchFilter(bank, 0.0, record.period, record.edges, np.zeros(1))

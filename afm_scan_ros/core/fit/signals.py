@@ -18,7 +18,8 @@ class Signals:
     """Drive u (V) and displacement y (m), both (n,), that count from sample ``first`` on.
 
     ``rested`` is whether the scanner had long rested at 0 V, depolarised; otherwise ``unknown``
-    says which of the unknown starts of a fit the record has, where it has one. ``noise`` (m) is the
+    says which of the unknown starts of a fit the record has, where it has one. The drive is the
+    ``recorded`` one of ``late`` samples earlier, where it is late. ``noise`` (m) is the
     standard deviation of a sample, ``tones`` (Hz) are sines in the displacement. Stretches of
     blocks, of one row of derivatives each, have ``edges`` in samples.
     """
@@ -34,6 +35,8 @@ class Signals:
     edges: Edges
     tones: tuple[float, ...] = ()
     unknown: int | None = None
+    late: int = 0
+    recorded: Array | None = None
 
     @property
     def blocks(self) -> int:
@@ -102,6 +105,20 @@ class Signals:
             columns += [pair, along * pair]
         return np.concatenate(columns, axis=1)
 
+    def read_late(self, samples: int, half_range: float, settings: FitSettings) -> "Signals":
+        """Return the record with a drive that is late by so many samples.
+
+        Until then it is what it was at the first sample. ``half_range`` is the operator's (V).
+        """
+        given = self.drive if self.recorded is None else self.recorded
+        drive = np.concatenate([np.full(samples, given[0]), given])[: len(given)]
+        first = self.first + samples - self.late if self.first else 0
+        edges = edges_of(
+            drive, self.displacement, self.noise, self.block, first, half_range, settings
+        )
+        moved = evolve(self, drive=drive, edges=edges, first=first)
+        return evolve(moved, late=samples, recorded=given)
+
     def with_tones(self, tones: Iterable[float], most: int) -> "Signals":
         """Add tones (Hz), at most so many in all, but none within a bin of one that is there."""
         found, bin_width = list(self.tones), 1.0 / (self.length * len(self.mean))
@@ -136,10 +153,23 @@ def signals_of(
         )
     first = known_from(drive, settings, depolarised=depolarised)
     first = first if first < settings.most_left_out * len(drive) else 0
+    edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
+    return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
+
+
+def edges_of(
+    drive: Array,
+    displacement: Array,
+    noise: float,
+    block: int,
+    first: int,
+    half_range: float,
+    settings: FitSettings,
+) -> Edges:
+    """Edges (samples) of stretches of blocks over which a record is smooth; see ``Signals``."""
     both = averaged(drive, block), averaged(displacement, block)
     quiet, begins = noise / np.sqrt(block), -(-first // block)
-    edges = block * smooth_edges(*both, quiet, half_range, begins, settings)
-    return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
+    return block * smooth_edges(*both, quiet, half_range, begins, settings)
 
 
 def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.dynamics import PoleBank, States
 from afm_scan_ros.core.fit.parameters import Layout
 from afm_scan_ros.core.fit.response import Response, respond
@@ -32,7 +33,18 @@ class Simulation:
     @cached_property
     def response(self) -> Response:
         """Response to F, sample by sample."""
-        return respond(self.dynamics, self.record.period, self.effective, self.settled)
+        return self.responding(self.theta)
+
+    def responding(self, theta: Array, later: float = 0.0) -> Response:
+        """Return the response to the same F of V, C and M at some θ, read so much (s) ``later``.
+
+        Raises InputError where the sensor is ahead of a drive that is late, by a sample or more.
+        """
+        layout, record = self.layout, self.record
+        late = later + layout.delay_of(theta) - record.late * record.period
+        if late <= -record.period:
+            raise InputError(f"{record.name}: the delay of the fit is {late:.3g} s")
+        return respond(layout.dynamics(theta), record.period, self.effective, self.settled, late)
 
     @cached_property
     def output(self) -> Array:
@@ -86,21 +98,26 @@ class Simulation:
         return StretchFilter(bank, 1.0, *given)(np.hstack(columns))
 
     @cached_property
-    def corner(self) -> Array:
-        """Derivative by the logarithm of the sensor's corner, (stretches, 1), by a difference.
+    def sensed(self) -> Array:
+        """Derivatives by what θ has of the sensor, (stretches, parameters), by differences.
 
-        There is no column without a sensor.
+        They are those by the logarithm of its corner and by its delay, as far as it has them.
         """
-        layout, edges = self.layout, self.record.edges
-        part, apart = layout.parts["sensor"], float(np.cbrt(np.finfo(float).eps))
-        if not layout.sensor_order:
-            return np.zeros((len(edges) - 1, 0))
-        step = np.zeros(layout.size)
-        step[part] = apart
-        given = self.record.period, self.effective, self.settled
-        ends = [layout.dynamics(self.theta + way * step) for way in (1.0, -1.0)]
-        up, down = (means(respond(one, *given).output, edges) for one in ends)
-        return np.asarray((up - down)[:, np.newaxis] / (2.0 * apart))
+        columns = np.zeros((len(self.record.edges) - 1, 0))
+        apart = float(np.cbrt(np.finfo(float).eps))
+        if self.layout.sensor_order:
+            step = np.zeros(self.layout.size)
+            step[self.layout.parts["sensor"].start] = apart
+            ends = [self.responding(self.theta + way * step).output for way in (1.0, -1.0)]
+            columns = np.column_stack([columns, self._change(*ends) / (2.0 * apart)])
+        if self.layout.delayed:
+            apart *= self.record.period
+            later = self.responding(self.theta, apart).output
+            columns = np.column_stack([columns, self._change(later, self.response.output) / apart])
+        return columns
+
+    def _change(self, one: Array, other: Array) -> Array:
+        return means(one - other, self.record.edges)
 
 
 def simulate(layout: Layout, theta: Array, record: Signals) -> Simulation:

@@ -66,3 +66,10 @@ class SensorLowPass(Finding):
 
     order: int
     corner: float
+
+
+@frozen
+class LateReading(Finding):
+    """A displacement that is read later than the drive is written, by a ``delay`` (s)."""
+
+    delay: float

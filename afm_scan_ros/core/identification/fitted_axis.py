@@ -18,6 +18,7 @@ from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.findings import (
     Finding,
     Hum,
+    LateReading,
     NotConverged,
     NotValidated,
     ReadAfterUpdate,
@@ -201,7 +202,10 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
         if record.first:
             yield UnknownStart(record.name, record.first * record.period)
     if sensor := fit.layout.sensor_of(fit.theta):
-        yield SensorLowPass(sensor.order, sensor.corner)
+        if sensor.corner is not None:
+            yield SensorLowPass(sensor.order, sensor.corner)
+        if sensor.delay:
+            yield LateReading(sensor.delay)
     if not fit.converged:
         yield NotConverged(fit.remaining)
 

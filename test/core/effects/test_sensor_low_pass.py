@@ -56,7 +56,21 @@ def test_it_changes_what_is_predicted_and_not_the_inverse() -> None:
     assert np.std(moved[1] - expected) < 1e-3 * np.std(moved[0])
 
 
-@pytest.mark.parametrize(("order", "corner"), [(1, 100.0), (3, 100.0), (0, 100.0), (2, 0.0)])
+@given(st.floats(0.0, 1.0))
+def test_it_reads_late_by_its_delay(delay: float) -> None:
+    lag, omega = VibrationModel((3e-6,), (0.1, 1.0)), np.geomspace(0.1, 100.0, 20)
+    found = SensorModel(delay=delay).read(lag).response(omega)
+    np.testing.assert_allclose(found, np.exp(-1j * omega * delay) * lag.response(omega))
+
+
+def test_a_negative_delay_is_refused() -> None:
+    with pytest.raises(InputError, match="delay is -1e-06 s"):
+        SensorModel(delay=-1e-6)
+
+
+@pytest.mark.parametrize(
+    ("order", "corner"), [(1, 100.0), (3, 100.0), (0, 100.0), (2, 0.0), (2, np.inf)]
+)
 def test_an_odd_order_or_no_corner_is_refused(order: int, corner: float) -> None:
     with pytest.raises(InputError, match="even order and a positive corner"):
         SensorModel(order, corner)

@@ -1,6 +1,7 @@
 """The exact response of the linear part, and the states that its derivatives are made of."""
 
 import numpy as np
+from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
@@ -21,17 +22,36 @@ def held(pole: complex, inputs: Array, settled: float) -> Complex:
     return np.asarray(states)
 
 
-@given(seed=st.integers(0, 10_000), modes=st.integers(0, 3), settled=st.sampled_from([0.0, 2.0]))
-def test_it_is_that_of_filters_in_series(seed: int, modes: int, settled: float) -> None:
+def bank(seed: int, modes: int) -> tuple[PoleBank, np.random.Generator]:
     rng = np.random.default_rng(seed)
     poles = rng.uniform(500.0, 5000.0, modes) * (-0.02 + 1j)
     lags, slow = -rng.uniform(2e3, 2e4, 3), rng.uniform(3e-3, 1.0, 4)
-    every, weights = np.concatenate([poles, lags]), rng.normal(size=modes + 3) + 0j
+    weights = rng.normal(size=modes + 3) + 0j
     weights[:modes] += 1j * rng.normal(size=modes)
-    gains = rng.uniform(0.0, 0.1, 4)
+    every = np.concatenate([poles, lags])
+    return PoleBank(every, weights, rng.uniform(0.0, 0.1, 4), slow, (NONE, NONE)), rng
+
+
+@given(seed=st.integers(0, 10_000), modes=st.integers(0, 3), eighths=st.integers(-7, 40))
+def test_it_is_read_late_as_if_sampled_more_often(seed: int, modes: int, eighths: int) -> None:
+    """By less than a sample it may be read early too, while the input is held."""
+    drawn, rng = bank(seed, modes)
+    fast = evolve(drawn, gains=np.zeros(4))
+    inputs = 2.0 + np.cumsum(rng.normal(size=COUNT))
+    finer = respond(fast, PERIOD / 8.0, np.repeat(inputs, 8), 2.0).output
+    padded = np.concatenate([np.full(40, finer[0]), finer])
+    expected = padded[40 - eighths : 40 - eighths + 8 * COUNT : 8]
+    found = respond(fast, PERIOD, inputs, 2.0, eighths * PERIOD / 8.0).output
+    np.testing.assert_allclose(found[: len(expected)], expected, atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000), modes=st.integers(0, 3), settled=st.sampled_from([0.0, 2.0]))
+def test_it_is_that_of_filters_in_series(seed: int, modes: int, settled: float) -> None:
+    drawn, rng = bank(seed, modes)
+    every, weights, gains, slow = drawn.poles, drawn.weights, drawn.gains, drawn.time_constants
     inputs = settled + np.cumsum(rng.normal(size=COUNT))
     edges = np.unique([0, COUNT, *rng.integers(1, COUNT, 40)])
-    found = respond(PoleBank(every, weights, gains, slow, (NONE, NONE)), PERIOD, inputs, settled)
+    found = respond(drawn, PERIOD, inputs, settled)
 
     states = [held(pole, inputs, settled) for pole in every]
     moved = sum((w * x).real for w, x in zip(weights, states, strict=True))

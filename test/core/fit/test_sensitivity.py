@@ -37,31 +37,39 @@ def drive() -> Array:
 KINDS = list(product(("plays", "one state"), (1, 4)))
 
 
-def at_some_theta(kind: str, sensor_order: int = 0) -> tuple[Layout, Array, np.random.Generator]:
+def at_some_theta(
+    kind: str, sensor_order: int = 0, *, delayed: bool = False
+) -> tuple[Layout, Array, np.random.Generator]:
     rng = np.random.default_rng(3)
     operator = PlayBank(-LIMIT, LIMIT) if kind == "plays" else OneState(-LIMIT, LIMIT, (-1.5, 1.5))
     layout = layout_of(operator, 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
-    layout = evolve(layout, sensor_order=sensor_order)
+    layout = evolve(layout, sensor_order=sensor_order, delayed=delayed)
     layout, theta = layout.with_mode(layout.start(), (2.0 * np.pi * FREQUENCY, DAMPING, 0.8, 0.1))
     for name, size in {"density": 0.3, "correction": 0.05, "slopes": 0.1, "map": 0.05}.items():
         if name in layout.parts:
             theta[layout.parts[name]] += size * rng.standard_normal(theta[layout.parts[name]].size)
     theta[layout.parts["creep"]] = 0.02 * rng.random(theta[layout.parts["creep"]].size)
-    theta[layout.parts["sensor"]] = np.log(3.0 * FREQUENCY)
+    if delayed:  # where derivatives by all else do not see it
+        theta[layout.parts["sensor"].stop - 1] = 1e-3 * PERIOD
+    if sensor_order:
+        theta[layout.parts["sensor"].start] = np.log(3.0 * FREQUENCY)
     theta[layout.parts["rest"]] = 0.3
     memory = 0.4 * operator.expected_memory() * rng.uniform(-1.0, 1.0, operator.unknowns)
     return evolve(layout, unknown_starts=1), np.concatenate([theta, memory]), rng
 
 
 STARTS = {"rested": (True, None, 0), "in use": (False, None, 2), "unknown": (False, 0, 4)}
-"""Whether a scanner rested, which unknown start it had, and the order of its sensor."""
+"""Whether a scanner rested, which unknown start it had, and the order of its sensor.
+
+Where it is of order 2, it is delayed too.
+"""
 
 
 @pytest.mark.parametrize("start", STARTS)
 @pytest.mark.parametrize(("kind", "block"), KINDS)
 def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, start: str) -> None:
     rested, unknown, order = STARTS[start]
-    layout, theta, rng = at_some_theta(kind, order)
+    layout, theta, rng = at_some_theta(kind, order, delayed=order == 2)
     drive = drive if rested else drive + 0.3
     one, operator = signals(drive, 1e-6 * drive, block), layout.operator
     one = evolve(one, rested=rested, unknown=unknown)
@@ -72,9 +80,11 @@ def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, sta
     known = layout.parts["sensor"].stop
     remembered = np.arange(layout.parts["creep"].stop, layout.size)
     for place in [*rng.choice(known, 60, replace=False), *remembered]:
-        step = 1e-5 * np.eye(layout.size)[place]
+        delay = layout.delayed and place == layout.parts["sensor"].stop - 1
+        apart = 1e-5 * (PERIOD if delay else 1.0)
+        step = apart * np.eye(layout.size)[place]
         up, down = (simulate(layout, theta + way * step, one) for way in (1.0, -1.0))
-        slope = (up.output - down.output)[one.used] / 2e-5
+        slope = (up.output - down.output)[one.used] / (2.0 * apart)
         motion = float(np.linalg.norm(slope)) + 1e-6
         close = 0.003 if block == 1 else 0.02 if kind == "one state" else 0.15
         assert np.linalg.norm(slope - found[:, place]) < close * motion + 5e-5, place
@@ -86,7 +96,7 @@ def test_residuals_are_pulled_back_by_the_same_jacobian(
     drive: Array, kind: str, block: int, start: str
 ) -> None:
     rested, unknown, order = STARTS[start]
-    layout, theta, rng = at_some_theta(kind, order)
+    layout, theta, rng = at_some_theta(kind, order, delayed=order == 2)
     one = evolve(signals(drive, 1e-6 * drive, block), rested=rested, unknown=unknown)
     one = evolve(one, edges=np.unique([*one.edges[::3], one.edges[-1]]))
     at = simulate(layout, theta, one)
