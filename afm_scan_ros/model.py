@@ -166,9 +166,11 @@ class Model:
             m, of the drive's shape. Effects that are unknown are left out; a warning in the log
             names them.
         std : ndarray
-            m, of the drive's shape, without the sensor's noise: the rms that the model's error on
-            its records foresees of such motion. Beyond the identified range it also holds how far
-            the prediction is from a straight line there. Only where ``return_std``.
+            m, of the drive's shape, without the sensor's noise: how far the parameters may be from
+            those found, which varies along the drive, and the error that is left on records, over
+            their motion. A model that states no ``spread`` has the rms error that its records
+            foresee of such motion. Beyond the identified range it also holds how far the
+            prediction is from a straight line there. Only where ``return_std``.
 
         Raises
         ------

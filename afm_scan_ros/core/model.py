@@ -28,6 +28,7 @@ from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, Weight
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import AXES, floats
 
 __all__ = [
@@ -258,6 +259,8 @@ class AxisModel:
     """How each base effect is known, and where it holds."""
     sensor: SensorModel | None = None
     """Low-pass through which the displacement is read: predicted, and never inverted."""
+    spread: Spread | None = field(default=None, eq=False, repr=False)
+    """How far the scanner may be from the model; a model that no fit has made states none."""
 
     @property
     def read_vibration(self) -> VibrationModel:

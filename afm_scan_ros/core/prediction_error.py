@@ -1,21 +1,24 @@
-"""How well a model predicts a motion, by its error on its records."""
+"""How well a model predicts a motion: by its parameters, and by its error on its records."""
 
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import unknown_beyond
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.extension import extended_axis, unknown_beyond
+from afm_scan_ros.core.model import AxisModel, ScannerModel
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.spread import Spread, Variant
 from afm_scan_ros.core.types import Array, Trace
 
 
 def standard_deviation(model: ScannerModel, drive: Trace, moved: Trace) -> Trace:
     """Standard deviation (m) of a motion predicted for a drive (V), without the sensor's noise.
 
-    It is the rms error of the whole motion, and more where the drive leaves the identified range.
-    Raises InputError where an axis states no error.
+    It is more where the drive leaves the identified range. Of a model without a ``Spread`` it is
+    the rms error of the whole motion. Raises InputError where an axis states no error.
     """
     found = {
         name: _of_axis(model, name, getattr(drive, name), getattr(moved, name), drive.sample_period)
@@ -29,6 +32,48 @@ def _of_axis(
     model: ScannerModel, name: str, drive: Array, moved: Array, sample_period: float
 ) -> Array:
     axis = model.axis(name)
+    beyond = unknown_beyond(axis, drive)
+    if axis.spread is None:
+        return np.asarray(np.hypot(_of_records(axis, name, moved, sample_period), beyond))
+    known = np.sum(apart(axis, axis.spread, drive, sample_period) ** 2, axis=0)
+    left = discrepancy(axis.spread, moved, sample_period)
+    return np.asarray(np.sqrt(known + left**2 + beyond**2))
+
+
+def apart(axis: AxisModel, spread: Spread, drive: Array, sample_period: float) -> Array:
+    """What a standard deviation in each direction adds to a prediction (m), (directions, n).
+
+    Effects that were added to the axis are left out: they change it by far less than it is.
+    """
+    middle = _moved(axis, spread.centre, drive, sample_period)
+    return np.array(
+        [
+            (_moved(axis, one, drive, sample_period) - middle) / one.deviations
+            for one in spread.directions
+        ]
+    ).reshape(-1, len(drive))
+
+
+def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:
+    """Rms error (m) of a predicted motion (m), (n,), beyond what its parameters explain."""
+    return float(np.linalg.norm(spread.shares * rms_by_band(moved, spread.bands, sample_period)))
+
+
+def _moved(axis: AxisModel, variant: Variant, drive: Array, sample_period: float) -> Array:
+    other = evolve(
+        axis,
+        hysteresis=evolve(axis.hysteresis, forward=variant.forward, output=variant.output),
+        vibration=variant.vibration,
+        creep=variant.creep,
+        sensor=variant.sensor,
+        added=(),
+    )
+    cascade = forward(extended_axis(other, drive), sample_period)
+    return cascade.apply(cascade.at_rest(), drive)[1]
+
+
+def _of_records(axis: AxisModel, name: str, moved: Array, sample_period: float) -> float:
+    """Rms error (m) of a motion by that on the model's records."""
     if not axis.model_discrepancies:
         raise InputError(
             f"the model of axis {name} states no error, so none of a prediction: identify it anew,"
@@ -36,5 +81,4 @@ def _of_axis(
         )
     resonance = resonance_of(axis.vibration, sample_period)
     limit = detection_limit(axis.model_discrepancies, moved, sample_period, resonance)
-    known = np.sqrt(np.sum(np.maximum(limit.rms**2 - limit.noise**2, 0.0)))
-    return np.asarray(np.hypot(known, unknown_beyond(axis, drive)))
+    return float(np.sqrt(np.sum(np.maximum(limit.rms**2 - limit.noise**2, 0.0))))

@@ -34,24 +34,30 @@ from afm_scan_ros.core.model import (
     AxisModel,
     BaseEffects,
     CreepModel,
-    DuhemSlopes,
     EffectStatus,
-    EverettSurface,
-    HysteresisModel,
-    HysteresisOperator,
     ModelDiscrepancy,
-    OutputMap,
     ParameterInterval,
     ScannerModel,
     Status,
-    VibrationModel,
 )
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.arrays import Archive
+from afm_scan_ros.files.effect_records import (
+    Arrays,
+    CreepRecord,
+    HysteresisRecord,
+    SensorRecord,
+    VibrationRecord,
+    hysteresis_from,
+    hysteresis_to,
+    vibration_from,
+    vibration_to,
+)
 from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, refuse_unknown, to_mapping
+from afm_scan_ros.files.spread_file import SpreadRecord, spread_from, spread_to
 
 ROOM = 0.01
 """Share of a bound by which a value may exceed it: another identification has another scale."""
@@ -121,70 +127,7 @@ def _value(parameter: EffectParameter, given: dict[str, Any]) -> float:
     return value
 
 
-Arrays = dict[str, Array]
-
-
-@frozen
-class _Surface:
-    lower: float = field(metadata={"suffix": "_v"})
-    upper: float = field(metadata={"suffix": "_v"})
-    offset: float = field(metadata={"suffix": "_v"})
-    values: str
-    bias: float | None = field(default=None, metadata={"suffix": "_v"})
-    uneven: str | None = field(default=None, metadata={"suffix": "_levels"})
-
-
-@frozen
-class _Slopes:
-    """DuhemSlopes; the array ``values`` has the centre, the rising and the falling in columns."""
-
-    lower: float = field(metadata={"suffix": "_v"})
-    upper: float = field(metadata={"suffix": "_v"})
-    offset: float = field(metadata={"suffix": "_v"})
-    rest: float = field(metadata={"suffix": "_v"})
-    widths: tuple[float, float] = field(metadata={"suffix": "_v"})
-    values: str
-
-
-@frozen
-class _OutputMap:
-    lower: float = field(metadata={"suffix": "_v"})
-    upper: float = field(metadata={"suffix": "_v"})
-    coefficients: tuple[float, ...] = field(metadata={"suffix": "_v"})
-
-
-@frozen(kw_only=True)
-class _Hysteresis:
-    """With the one or the other operator: ``forward`` is Preisach's, ``duhem`` is Duhem's."""
-
-    forward: _Surface | None = None
-    duhem: _Slopes | None = None
-    direct: _Surface
-    output: _OutputMap | None = None
-    inverse: str = "exact"
-
-
-@frozen
-class _Vibration:
-    numerator: tuple[float, ...] = field(metadata={"suffix": "_v_per_v"})
-    denominator: tuple[float, ...]
-    delay: float = field(default=0.0, metadata={"suffix": "_s"})
-
-
-@frozen
-class _Creep:
-    gains: tuple[float, ...]
-    time_constants: tuple[float, ...] = field(metadata={"suffix": "_s"})
-
-
 NANOMETRES = {"suffix": "_nm", "scale": 1e-9}
-
-
-@frozen
-class _Sensor:
-    order: int = 0
-    corner: float | None = field(default=None, metadata={"suffix": "_hz"})
-    delay: float = field(default=0.0, metadata={"suffix": "_s"})
 
 
 @frozen
@@ -220,14 +163,15 @@ class _Effects:
 
 @frozen
 class _Axis:
-    hysteresis: _Hysteresis
-    vibration: _Vibration
-    creep: _Creep
+    hysteresis: HysteresisRecord
+    vibration: VibrationRecord
+    creep: CreepRecord
     model_discrepancy: _ModelDiscrepancy | None = None
     added: tuple[AddedEffect, ...] = ()
     known_elsewhere: tuple[_ModelDiscrepancy, ...] = ()
     effects: _Effects | None = None
-    sensor: _Sensor | None = None
+    sensor: SensorRecord | None = None
+    spread: SpreadRecord | None = None
 
 
 @frozen
@@ -304,91 +248,37 @@ def _in_bytes(value: Any) -> Iterator[bytes]:  # noqa: ANN401 - a record or numb
 
 def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
     with naming("hysteresis"):
-        hysteresis = _hysteresis_from(axis.hysteresis, arrays)
-    numerator = tuple(c * sensitivity for c in axis.vibration.numerator)
-    known, given = axis.model_discrepancy, axis.effects
+        hysteresis = hysteresis_from(axis.hysteresis, arrays)
+    known, given, apart = axis.model_discrepancy, axis.effects, axis.spread
+    with naming("spread"):
+        spread = None if apart is None else spread_from(apart, sensitivity, arrays)
     parts = () if given is None else (given.creep, given.hysteresis, given.vibration)
     model = AxisModel(
         hysteresis,
-        VibrationModel(numerator, axis.vibration.denominator, axis.vibration.delay),
+        vibration_from(axis.vibration, sensitivity),
         recast(CreepModel, axis.creep),
         None if known is None else recast(ModelDiscrepancy, known),
         (),
         tuple(recast(ModelDiscrepancy, each) for each in axis.known_elsewhere),
         BaseEffects(*(recast(EffectStatus, part) for part in parts)),
         None if axis.sensor is None else recast(SensorModel, axis.sensor),
+        spread,
     )
     model = evolve(model, added=added_from(axis.added, scale_of(model)))
     chain_of(model)  # raises where added effects cannot stand beside each other
     return model
 
 
-def _hysteresis_from(given: _Hysteresis, arrays: Archive) -> HysteresisModel:
-    operator = _operator_from(given, arrays)
-    with naming("direct"):
-        direct = _surface_from(given.direct, arrays)
-    behind = None if given.output is None else recast(OutputMap, given.output)
-    return HysteresisModel(operator, direct, behind, given.inverse)
-
-
-def _operator_from(given: _Hysteresis, arrays: Archive) -> HysteresisOperator:
-    if given.forward is not None and given.duhem is None:
-        with naming("forward"):
-            return _surface_from(given.forward, arrays)
-    if given.duhem is not None and given.forward is None:
-        with naming("duhem"):
-            return _slopes_from(given.duhem, arrays)
-    raise InputError("give one operator, forward (Preisach's) or duhem")
-
-
-def _surface_from(given: _Surface, arrays: Archive) -> EverettSurface:
-    values = arrays.matrix(given.values, square=True)
-    uneven = None if given.uneven is None else arrays.matrix(given.uneven).ravel()
-    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias, uneven)
-
-
-def _slopes_from(given: _Slopes, arrays: Archive) -> DuhemSlopes:
-    values = arrays.matrix(given.values)
-    centre, rising, falling = np.split(values, (1, 1 + values.shape[1] // 2), axis=1)
-    outputs = given.offset, given.rest, given.widths
-    return DuhemSlopes(given.lower, given.upper, *outputs, centre[:, 0], rising, falling)
-
-
 def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
     known = axis.model_discrepancy
-    numerator = tuple(c / SENSOR_SENSITIVITY for c in axis.vibration.numerator)
     return _Axis(
-        _hysteresis_to(axis.hysteresis, name, arrays),
-        _Vibration(numerator, axis.vibration.denominator, axis.vibration.delay),
-        recast(_Creep, axis.creep),
+        hysteresis_to(axis.hysteresis, name, arrays),
+        vibration_to(axis.vibration),
+        recast(CreepRecord, axis.creep),
         None if known is None else recast(_ModelDiscrepancy, known),
         added_to(axis.added),
         tuple(recast(_ModelDiscrepancy, each) for each in axis.known_elsewhere),
         _Effects(*(recast(_Effect, status) for _, status in axis.effects.each())),
-        None if axis.sensor is None else recast(_Sensor, axis.sensor),
-    )
-
-
-def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> _Surface:
-    arrays[name] = of.values
-    levels = None
-    if of.uneven is not None:
-        levels = f"{name}_levels"
-        arrays[levels] = of.uneven[np.newaxis]
-    return _Surface(of.lower, of.upper, of.offset, name, of.bias, levels)
-
-
-def _hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> _Hysteresis:
-    behind, of = model.output, model.forward
-    given = None if behind is None else recast(_OutputMap, behind)
-    forward = duhem = None
-    if isinstance(of, EverettSurface):
-        forward = _surface_to(of, f"{axis}_forward", arrays)
-    else:
-        name = f"{axis}_duhem"
-        arrays[name] = np.column_stack([of.centre, of.rising, of.falling])
-        duhem = _Slopes(of.lower, of.upper, of.offset, of.rest, of.widths, name)
-    direct = _surface_to(model.direct, f"{axis}_direct", arrays)
-    return _Hysteresis(
-        forward=forward, duhem=duhem, direct=direct, output=given, inverse=model.inverse
+        None if axis.sensor is None else recast(SensorRecord, axis.sensor),
+        None if axis.spread is None else spread_to(axis.spread, name, arrays),
     )

@@ -2,9 +2,10 @@
 
 import numpy as np
 from attrs import evolve
-from scipy.optimize import nnls
+from scipy.optimize import brentq, nnls
 
 from afm_scan_ros.core.effects.base import Cascade
+from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
@@ -12,7 +13,9 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.starts import rest_of
-from afm_scan_ros.core.model import AxisModel, HysteresisModel
+from afm_scan_ros.core.model import AxisModel, HysteresisModel, HysteresisOperator
+from afm_scan_ros.core.spread import Variant
+from afm_scan_ros.core.types import Array
 
 
 def model_of(fit: AxisFit) -> AxisModel:
@@ -32,11 +35,57 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     if isinstance(layout.operator, Plays):
         bias, _ = layout.operator.bias(rest_of(fit))
         surface = layout.operator.surface(theta, bias, mixed=True)
+        rest = layout.operator.output(theta, np.zeros(1), layout.operator.at_rest(rest_of(fit))[0])
+        surface = _resting(surface, float(rest[0]), layout.settings)
         surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
     slopes = layout.operator.slopes(theta, rest_of(fit))
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
+
+
+def _resting(surface: EverettSurface, rest: float, settings: FitSettings) -> EverettSurface:
+    """Return a surface whose bias lets it rest at an output (V), as the plays do that it is of.
+
+    With their own bias it would rest up to 1/5000 of the range elsewhere, as there are no loops
+    between its levels. Where no bias nearby does so it stays.
+    """
+
+    def apart(bias: float) -> float:
+        return float(Preisach(evolve(surface, bias=bias)).at_rest().now[1]) - rest
+
+    own, most = surface.bias or 0.0, 0.5 * settings.rest_bias * (surface.upper - surface.lower)
+    ends = own - most, own + most
+    if apart(ends[0]) * apart(ends[1]) >= 0.0:
+        return surface
+    return evolve(surface, bias=float(brentq(apart, *ends)))
+
+
+def variant_of(fit: AxisFit, move: Array, deviations: float) -> Variant:
+    """Return the effects at θ + ``deviations`` ``move``, with F = 0 at depolarised rest.
+
+    All variants of a fit have the same structure. Raises InputError where these are no effects.
+    """
+    layout, theta = fit.layout, fit.theta + deviations * move
+    dynamics, sensor = layout.dynamics(theta), layout.sensor_of(theta)
+    vibration, operator = dynamics.vibration(fit.gain), _coarse(fit, theta)
+    creep = CreepModel(dynamics.gains, dynamics.time_constants)
+    return Variant(*operator, vibration, creep, sensor, deviations)
+
+
+def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap | None]:
+    """Operator of ``spread_levels`` and the map behind it, as near θ as the model is to the fit."""
+    layout, settings = fit.layout, fit.layout.settings
+    plays, given = layout.operator, layout.of_operator(theta)
+    rest = rest_of(AxisFit(layout, fit.records, fit.gain, theta))
+    if not isinstance(plays, Plays):
+        return plays.slopes(given, rest), None
+    levels = np.linspace(plays.lower, plays.upper, settings.spread_levels)
+    fitted, _ = plays.everett(layout.of_operator(fit.theta), levels)
+    values, offset = plays.everett(given, levels)
+    values = values - fitted + grown(fitted, levels, settings.least_slope)[0]
+    surface = EverettSurface(plays.lower, plays.upper, values, offset, plays.bias(rest)[0])
+    return from_rest(surface, layout.map_of(theta))
 
 
 def from_rest(

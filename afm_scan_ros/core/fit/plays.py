@@ -317,6 +317,15 @@ class Plays:
         straight line so far that it does. Raises InputError where it does not.
         """
         levels = self.levels
+        values, offset = self.everett(theta, levels)
+        share = 0.0
+        if mixed:
+            values, share = grown(values, levels, self.settings.least_slope)
+        offset += share * (self.lower - offset)
+        return EverettSurface(self.lower, self.upper, values, offset, bias)
+
+    def everett(self, theta: Array, levels: Array) -> tuple[Array, float]:
+        """E (V) at levels (V), (n, n), whether it grows or not, and the output (V) at ``lower``."""
         values, offset = np.zeros((len(levels),) * 2), 0.0
         each_play = zip(self.thresholds, self.settled, self.tables(theta), strict=True)
         for r, settled, table in each_play:
@@ -330,12 +339,7 @@ class Plays:
             )
             values += 0.5 * (risen - fallen)
             offset += float(np.interp(self.lower + r, self.positions, table))
-        values = np.tril(values, -1)
-        share = 0.0
-        if mixed:
-            values, share = grown(values, levels, self.settings.least_slope)
-        offset += share * (self.lower - offset)
-        return EverettSurface(self.lower, self.upper, values, offset, bias)
+        return np.tril(values, -1), offset
 
 
 @compiled

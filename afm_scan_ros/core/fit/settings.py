@@ -522,6 +522,48 @@ class FitSettings:
         "standard deviation of a predicted scan above which a user is warned",
         "a straight line errs by some per cent",
     )
+    wider_scales: float = setting(
+        2.0,
+        "1",
+        "factor over the scales of the greatest evidence at which parameters are uncertain",
+        "evidence tells a scale to about such a factor",
+    )
+    least_discrepancy: float = setting(
+        1e-4,
+        "1",
+        "error of a prediction over its motion beforehand, beyond what its parameters explain",
+        "grids of plays and slopes leave as much of operators that are not made of them",
+    )
+    spread_directions: int = setting(
+        12,
+        "1",
+        "most directions that a model keeps of the covariance of its parameters",
+        "in trials the standard deviation of fresh scans is within a third of that of all",
+    )
+    spread_left: float = setting(
+        0.01,
+        "1",
+        "share of the variance of predictions that further directions may hold",
+        "it changes a standard deviation by half of that",
+    )
+    spread_levels: int = setting(
+        41,
+        "1",
+        "levels of the surfaces by which directions of the parameters differ",
+        "as many as the direct inverse has; differences are smooth",
+    )
+    spread_sizes: int = setting(
+        3,
+        "1",
+        "sizes of scans whose variance chooses the directions, each half the last",
+        "images are taken at such sizes",
+    )
+    scan_samples: int = setting(
+        1000,
+        "1",
+        "samples of a cycle of these scans",
+        "a branch of 500 samples shows plays of a hundredth of the range",
+    )
     like_gains: float = setting(
         2.0,
         "1",

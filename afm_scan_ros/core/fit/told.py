@@ -11,12 +11,11 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy.ndimage import uniform_filter1d
 
+from afm_scan_ros.core.fit.directions import variants
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
-from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals
-from afm_scan_ros.core.fit.simulation import simulate
-from afm_scan_ros.core.fit.uncertainty import information, inverse
+from afm_scan_ros.core.fit.uncertainty import information, inverse, of_records
 from afm_scan_ros.core.model import (
     BaseEffects,
     EffectStatus,
@@ -25,6 +24,7 @@ from afm_scan_ros.core.model import (
     Status,
     closed,
 )
+from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
 
 CONFIDENT = 1.96
@@ -35,11 +35,14 @@ CONFIDENT = 1.96
 class Knowledge:
     """What is known of θ: covariances of the posterior, and both at the greatest scales.
 
-    All are of shape (size, size); ``posterior`` is at the scales of the greatest evidence.
+    All are of shape (size, size); ``posterior`` is at the scales of the greatest evidence,
+    ``wider`` at ``wider_scales`` times these. ``every`` are the normal equations' H of each record.
     """
 
     fit: AxisFit
+    every: list[Array]
     posterior: Array
+    wider: Array
     widest: Array
     beforehand: Array
 
@@ -47,12 +50,15 @@ class Knowledge:
     def of(cls, fit: AxisFit) -> "Knowledge":
         """Invert the precisions of a fit's parameters."""
         greatest = {name: getattr(fit.layout.settings, name) for name in SEARCHED}
-        told = information(fit)
-        own, wide = (fit.layout.prior(scales, fit.theta)[0] for scales in (fit.scales, greatest))
-        posterior, widest, beforehand = (
-            inverse(fit, one) for one in (told + own, told + wide, wide)
+        factor = fit.layout.settings.wider_scales
+        wider = {name: min(factor * own, greatest[name]) for name, own in fit.scales.items()}
+        every = of_records(fit)
+        told = information(fit, every)
+        own, more, most = (
+            fit.layout.prior(scales, fit.theta)[0] for scales in (fit.scales, wider, greatest)
         )
-        return cls(fit, posterior, widest, beforehand)
+        each = (told + own, told + more, told + most, most)
+        return cls(fit, every, *(inverse(fit, one) for one in each))
 
     def tells(self, row: Array, expected: float | None = None) -> bool:
         """Whether the records narrow a combination of θ, (size,), to a share of what is expected.
@@ -70,31 +76,13 @@ class Knowledge:
         half = CONFIDENT * float(np.sqrt(row @ self.posterior @ row))
         return closed(name, (max(value - half, least), value + half), unit)
 
-    def of_scan(self) -> float:
-        """Standard deviation of a predicted scan but for its mean, over its range (1).
+    def variants(self) -> tuple[Variant, tuple[Variant, ...]]:
+        """Return the fit's own effects, and those in each direction of what is not known.
 
-        It is a triangle over the whole range, of a thousand samples of the fastest record a cycle,
-        and includes the discrepancy η.
+        Where the records do not tell the hysteresis, nor do they tell the scales of its prior.
         """
-        fit, layout = self.fit, self.fit.layout
-        low, high = layout.operator.lower, layout.operator.upper
-        drive = np.interp(np.arange(2001) % 1000, [0, 500, 1000], [low, high, low])
-        period = min(one.period for one in fit.records)
-        still = np.zeros_like(drive)
-        edges = np.arange(len(drive) + 1)
-        record = Signals(
-            "scan", drive, still, period, 1, 1000, rested=False, noise=0.0, edges=edges
-        )
-        simulation = simulate(layout, fit.theta, record)
-        theta = layout.of_operator(fit.theta)
-        pieces = layout.operator.pieces(theta, drive, edges, layout.start_of(fit.theta, record)[0])
-        rows = [one for _, one in jacobian(simulation, pieces)]
-        change = np.concatenate(rows)
-        change -= change.mean(axis=0)
-        variance = np.einsum("ij,jk,ik->", change, self.posterior, change, optimize=True)
-        moved = simulation.output[record.used]
-        error = variance / len(moved) + fit.discrepancy**2 * np.var(moved)
-        return float(np.sqrt(error) / np.ptp(moved))
+        told = _hysteresis(self).status is not Status.UNKNOWN
+        return variants(self.fit, self.wider if told else self.widest, self.every)
 
     def effects(self) -> BaseEffects:
         """How each effect is known, over which drive, frequencies and hold times."""

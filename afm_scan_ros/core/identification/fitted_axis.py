@@ -8,6 +8,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.directions import scans
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
@@ -28,6 +29,7 @@ from afm_scan_ros.core.identification.findings import (
 )
 from afm_scan_ros.core.identification.local_response import FrequencyResponse, local_response
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
+from afm_scan_ros.core.identification.spread_of_fit import HeldOut, spread_of
 from afm_scan_ros.core.identification.validation import (
     PREDICTED,
     Validation,
@@ -35,7 +37,10 @@ from afm_scan_ros.core.identification.validation import (
     validate_from,
 )
 from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.prediction_error import apart, discrepancy
 from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 
@@ -96,15 +101,18 @@ def identify_axis(
     fit = fit_axis(fitting, axis, progress=progress)
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
-    model, deviation = evolve(model_of(fit), effects=told.effects()), told.of_scan()
+    model = evolve(model_of(fit), effects=told.effects())
     progress("validating")
-    validations = [error_of(model, one, axis) for one in held_out]
+    left_out = [_held_out(model, one, axis) for one in held_out]
+    validations = [one.validation for one in left_out]
+    spread = spread_of(told, model, left_out)
+    deviation = _of_scan(model, spread, fit)
     known = [one.model_discrepancy for one in validations]
     for one in fitting:
         error = validate_from(model, _in_step(one.axis(axis)), 0).model_discrepancy
         known.append(of_fitted(error, fit.discrepancy))
     return FittedAxis(
-        model=model.also_known(known),
+        model=evolve(model.also_known(known), spread=spread),
         operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
         discrepancy=fit.discrepancy,
         deviation=deviation,
@@ -113,7 +121,7 @@ def identify_axis(
         warnings=(
             *_read_after(records, axis),
             *_of_fit(fit),
-            *_of_scan(deviation),
+            *_uncertain(deviation),
             *_of_validation(held_out, validations),
         ),
         validations=tuple(validations),
@@ -147,9 +155,25 @@ def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
 
     Raises InputError where the drive leaves the identified range.
     """
+    return _held_out(model, record, axis).validation
+
+
+def _held_out(model: AxisModel, record: Record, axis: str) -> HeldOut:
     given = _in_step(record.axis(axis))
     first = known_from(given.drive[:, 0], DEFAULT_SETTINGS, depolarised=record.depolarised)
-    return validate_from(model, given, first)
+    return HeldOut(given, first, validate_from(model, given, first))
+
+
+def _of_scan(model: AxisModel, spread: Spread, fit: AxisFit) -> float:
+    """Standard deviation of a predicted scan but for its mean, over its range (1).
+
+    It is the last cycle of a fast scan over the whole drive, from depolarised rest.
+    """
+    drive, period = next(scans(fit))
+    cycle, cascade = slice(-DEFAULT_SETTINGS.scan_samples, None), forward(model, period)
+    moved = cascade.apply(cascade.at_rest(), drive)[1][cycle]
+    known = np.var(apart(model, spread, drive, period)[:, cycle], axis=1).sum()
+    return float(np.sqrt(known + discrepancy(spread, moved, period) ** 2) / np.ptp(moved))
 
 
 def _in_step(record: Record) -> Record:
@@ -186,7 +210,7 @@ def _of_fit(fit: AxisFit) -> Iterator[Finding]:
         yield NotConverged(fit.remaining)
 
 
-def _of_scan(deviation: float) -> Iterator[Finding]:
+def _uncertain(deviation: float) -> Iterator[Finding]:
     """Yield that the records do not tell what a scan is, where they do not."""
     if deviation > DEFAULT_SETTINGS.poor:
         yield UncertainScan(deviation)
