@@ -89,9 +89,9 @@ class PlanOptions:
     ) -> tuple[float, float]:
         lowest, limit = self.lowest, self.limit
         if limit is None and model is not None:
-            surfaces = [model.axis(name).hysteresis.forward for name in model.axes]
-            limit = min(each.upper for each in surfaces)
-            lowest = max(each.lower for each in surfaces) if lowest is None else lowest
+            ranges = [model.axis(name).hysteresis.forward.drive_range for name in model.axes]
+            limit = min(upper for _, upper in ranges)
+            lowest = max(lower for lower, _ in ranges) if lowest is None else lowest
         elif limit is None and limits is not None:
             limit = limits.voltage
         if limit is None:

@@ -38,12 +38,18 @@ def extended(model: ScannerModel, drive: Trace) -> ScannerModel:
 
 def extended_axis(model: AxisModel, drive: Array) -> AxisModel:
     """Return the same of one axis, whose drive (V) is of shape (n,)."""
-    forward, grown = model.hysteresis.forward, 1.0 + ExtensionSettings().share
-    lowest = min(forward.lower, grown * forward.lower)
-    highest = max(forward.upper, grown * forward.upper)
-    if _within(drive, forward.lower, forward.upper) or not _within(drive, lowest, highest):
+    forward = model.hysteresis.forward
+    lower, upper = forward.drive_range
+    lowest, highest = _farther(lower, upper)
+    if _within(drive, lower, upper) or not _within(drive, lowest, highest):
         return model
     return evolve(model, hysteresis=evolve(model.hysteresis, forward=_wider(forward)))
+
+
+def _farther(lower: float, upper: float) -> tuple[float, float]:
+    """Return voltages (V) of which those away from 0 V are exceeded."""
+    grown = 1.0 + ExtensionSettings().share
+    return min(lower, grown * lower), max(upper, grown * upper)
 
 
 def _within(drive: Array, lower: float, upper: float) -> bool:
@@ -53,7 +59,7 @@ def _within(drive: Array, lower: float, upper: float) -> bool:
 def unknown_beyond(model: AxisModel, drive: Array) -> Array:
     """How far a slow prediction (m), (n,), is from a straight line where it is beyond the range."""
     forward = model.hysteresis.forward
-    inside = np.clip(drive, forward.lower, forward.upper)
+    inside = np.clip(drive, *forward.drive_range)
     if np.array_equal(inside, drive):
         return np.zeros(len(drive))
     effects = effect_of(_wider(forward)), effect_of(forward)
@@ -83,7 +89,8 @@ def _surface(surface: EverettSurface) -> EverettSurface:
         turned = _with_level(-levels[::-1], values[::-1, ::-1].T, -grown * surface.lower)
         levels, values = -turned[0][::-1], turned[1][::-1, ::-1].T
     bias = None if surface.bias is None else grown**2 * surface.bias
-    wider = EverettSurface(levels[0], levels[-1], values, surface.offset, bias, levels)
+    within = None if surface.within is None else _farther(*surface.within)
+    wider = EverettSurface(levels[0], levels[-1], values, surface.offset, bias, levels, within)
     rests = [Preisach(one).at_rest().now[1] for one in (surface, wider)]
     return evolve(wider, offset=surface.offset + rests[0] - rests[1])
 

@@ -31,6 +31,7 @@ class SurfaceRecord:
     values: str
     bias: float | None = field(default=None, metadata={"suffix": "_v"})
     uneven: str | None = field(default=None, metadata={"suffix": "_levels"})
+    within: tuple[float, float] | None = field(default=None, metadata={"suffix": "_v"})
 
 
 @frozen
@@ -116,7 +117,8 @@ def operator_from(
 def _surface_from(given: SurfaceRecord, arrays: Archive) -> EverettSurface:
     values = arrays.matrix(given.values, square=True)
     uneven = None if given.uneven is None else arrays.matrix(given.uneven).ravel()
-    return EverettSurface(given.lower, given.upper, values, given.offset, given.bias, uneven)
+    known = values, given.offset, given.bias, uneven, given.within
+    return EverettSurface(given.lower, given.upper, *known)
 
 
 def _slopes_from(given: SlopesRecord, arrays: Archive) -> DuhemSlopes:
@@ -144,7 +146,7 @@ def _surface_to(of: EverettSurface, name: str, arrays: Arrays) -> SurfaceRecord:
     if of.uneven is not None:
         levels = f"{name}_levels"
         arrays[levels] = of.uneven[np.newaxis]
-    return SurfaceRecord(of.lower, of.upper, of.offset, name, of.bias, levels)
+    return SurfaceRecord(of.lower, of.upper, of.offset, name, of.bias, levels, of.within)
 
 
 def hysteresis_to(model: HysteresisModel, axis: str, arrays: Arrays) -> HysteresisRecord:

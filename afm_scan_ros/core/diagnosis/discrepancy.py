@@ -246,7 +246,7 @@ def smooth(surface: EverettSurface) -> EverettSurface:
     )
     values = np.tril(spline(finer, finer), k=-1)
     limits, known = (surface.lower, surface.upper), (surface.offset, surface.bias)
-    return _ForwardHysteresis(*limits, values, *known, uneven=finer)
+    return _ForwardHysteresis(*limits, values, *known, uneven=finer, within=surface.within)
 
 
 def error_between_levels(playback: Playback, chain: Chain) -> Array:

@@ -60,7 +60,7 @@ def estimate_initial_state(
         )
         return float(np.mean(normalised_residual**2))
 
-    limits = surface.lower, surface.upper
+    limits = surface.drive_range
     before = misfit(DEPOLARISED)
     if before > WITHIN_NOISE * len(limit.rms):
         start = min(_candidate_states(limits, float(view.drive[0])), key=misfit)

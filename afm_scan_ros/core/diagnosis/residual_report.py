@@ -82,7 +82,7 @@ def describe(evidence: Evidence, chain: Chain, observed: Record) -> Description:
         sample_period=period,
         bands=rms_by_band(residual, limit.edges, period),
         initial_state=playback.initial_state,
-        drive_limits=(surface.lower, surface.upper),
+        drive_limits=surface.drive_range,
         own=correlation(residual, None, period, SEED),
         correlations={n: correlation(residual, s, period, SEED) for n, s in moving.items()},
         coherences={n: coherence(residual, s, period, limit.edges) for n, s in moving.items()},

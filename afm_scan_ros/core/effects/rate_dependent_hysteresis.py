@@ -125,7 +125,7 @@ class RateDependentHysteresis(CausalInverse):
 
     def apply(self, state: State, block: Array) -> tuple[State, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
-        refuse_beyond(block, self._preisach.surface.lower, self._preisach.surface.upper)
+        refuse_beyond(block, *self._preisach.surface.drive_range)
         end, late = self._lag.apply(state[1], block)
         memory, forced = self._preisach.apply(state[0], late)
         return (memory, end), forced + self._straight(block) - self._straight(late)

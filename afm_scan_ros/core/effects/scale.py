@@ -54,7 +54,7 @@ def _powers(unit: str) -> tuple[int, int, int]:
 def voltage_scale(model: AxisModel) -> float:
     """Largest drive of a model over that of the reference scanner."""
     forward = model.hysteresis.forward
-    return max(abs(forward.lower), abs(forward.upper)) / REFERENCE_VOLTAGE
+    return max(map(abs, forward.drive_range)) / REFERENCE_VOLTAGE
 
 
 def length_scale(model: AxisModel) -> float:
@@ -66,7 +66,8 @@ def length_scale(model: AxisModel) -> float:
 def half_range_of(model: AxisModel) -> float:
     """Displacement (m) from the middle to an end of the identified range, when slow."""
     forward = model.hysteresis.forward
-    return 0.5 * (forward.upper - forward.lower) * abs(forward.chord * model.vibration.static_gain)
+    lower, upper = forward.drive_range
+    return 0.5 * (upper - lower) * abs(forward.chord * model.vibration.static_gain)
 
 
 def resonance_of(vibration: VibrationModel, sample_period: float) -> float:

@@ -80,11 +80,11 @@ def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap |
     rest = rest_of(AxisFit(layout, fit.records, fit.gain, theta))
     if not isinstance(plays, Plays):
         return plays.slopes(given, rest), None
-    levels = np.linspace(plays.lower, plays.upper, settings.spread_levels)
+    levels = plays.levels(settings.spread_levels)
     fitted, _ = plays.everett(layout.of_operator(fit.theta), levels)
     values, offset = plays.everett(given, levels)
     values = values - fitted + grown(fitted, levels, settings.least_slope)[0]
-    surface = EverettSurface(plays.lower, plays.upper, values, offset, plays.bias(rest)[0])
+    surface = plays.surface_of(values, offset, plays.bias(rest)[0])
     return from_rest(surface, layout.map_of(theta))
 
 
@@ -109,7 +109,7 @@ def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> 
     """
     behind = () if mapped is None else (mapped,)
     whole = Cascade((Preisach(surface), *behind))
-    ends = np.array([surface.upper, surface.lower])
+    ends = np.array(surface.drive_range[::-1])
     saturated, (_, low) = whole.apply(whole.at_rest(), ends)
     high = whole.apply(saturated, ends[:1])[1][0]
     levels = np.linspace(low, high, count)
@@ -119,7 +119,7 @@ def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> 
         drive = whole.invert(saturated, there_and_back)[1]
         values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
     values, _ = grown(values, levels, DEFAULT_SETTINGS.least_slope)
-    return EverettSurface(float(low), float(high), values, surface.lower)
+    return EverettSurface(float(low), float(high), values, surface.drive_range[0])
 
 
 def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurface:

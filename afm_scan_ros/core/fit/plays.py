@@ -301,45 +301,71 @@ class Plays:
         return result
 
     @property
-    def levels(self) -> Array:
-        """Levels of the Everett surface, V."""
-        return np.linspace(self.lower, self.upper, self.settings.surface_levels)
+    def ends(self) -> tuple[float, float]:
+        """Ends (V) of the Everett surface: as far to both sides as the range, where that holds 0 V.
+
+        So the memory of depolarised rest is in the surface, also of a drive of one sign.
+        """
+        if not self.lower <= 0.0 <= self.upper:
+            return self.lower, self.upper
+        farthest = max(-self.lower, self.upper)
+        return -farthest, farthest
+
+    def levels(self, count: int) -> Array:
+        """Levels (V) of the Everett surface, ``count`` of them over the range."""
+        lower, upper = self.ends
+        whole = 1 + round((count - 1) * (upper - lower) / (self.upper - self.lower))
+        return np.linspace(lower, upper, whole)
 
     def surface(
         self, theta: Array, bias: float | None = None, *, mixed: bool = False
     ) -> EverettSurface:
         """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
 
-        Its ``bias`` (V) is that of depolarised rest.
+        Its ``bias`` (V) is that of depolarised rest of an oscillation as large as half the range.
 
-        Plays that the range cannot push both ways stay where they have settled. Where the surface
+        Plays that the surface cannot push both ways stay where they have settled. Where the surface
         does not grow, as a fit that has not converged may leave it, it may be ``mixed`` with a
         straight line so far that it does. Raises InputError where it does not.
         """
-        levels = self.levels
+        levels = self.levels(self.settings.surface_levels)
         values, offset = self.everett(theta, levels)
         share = 0.0
         if mixed:
             values, share = grown(values, levels, self.settings.least_slope)
-        offset += share * (self.lower - offset)
-        return EverettSurface(self.lower, self.upper, values, offset, bias)
+        return self.surface_of(values, offset + share * (self.ends[0] - offset), bias)
+
+    def surface_of(self, values: Array, offset: float, bias: float | None) -> EverettSurface:
+        """Return the surface of ``everett``, with a ``bias`` (V) as that of ``surface``."""
+        lower, upper = self.ends
+        if bias is not None:
+            bias *= (0.5 * (upper - lower) / self.half) ** 2
+        wider = upper - lower > self.upper - self.lower
+        within = (self.lower, self.upper) if wider else None
+        return EverettSurface(lower, upper, values, offset, bias, within=within)
 
     def everett(self, theta: Array, levels: Array) -> tuple[Array, float]:
-        """E (V) at levels (V), (n, n), whether it grows or not, and the output (V) at ``lower``."""
-        values, offset = np.zeros((len(levels),) * 2), 0.0
+        """E (V) at levels (V), (n, n), whether it grows or not, and the output (V) at the first."""
+        values, offset, half = np.zeros((len(levels),) * 2), 0.0, 0.5 * (levels[-1] - levels[0])
         each_play = zip(self.thresholds, self.settled, self.tables(theta), strict=True)
         for r, settled, table in each_play:
-            if r > self.half:
+            if r > half:
                 offset += float(np.interp(settled, self.positions, table))
                 continue
             top = levels[:, np.newaxis] - r
             risen, fallen = (
-                np.interp(each, self.positions, table)
-                for each in (top, np.minimum(levels + r, top))
+                self._continued(table, each) for each in (top, np.minimum(levels + r, top))
             )
             values += 0.5 * (risen - fallen)
-            offset += float(np.interp(self.lower + r, self.positions, table))
+            offset += float(self._continued(table, levels[0] + r))
         return np.tril(values, -1), offset
+
+    def _continued(self, table: Array, at: Array) -> Array:
+        """T_r at places (V): a table that goes on straight beyond the range, and does not fall."""
+        step = self.positions[1] - self.positions[0]
+        first, last = (max(float(table[i + 1] - table[i]), 0.0) / step for i in (0, -2))
+        below, above = np.minimum(at - self.lower, 0.0), np.maximum(at - self.upper, 0.0)
+        return np.asarray(np.interp(at, self.positions, table) + first * below + last * above)
 
 
 @compiled

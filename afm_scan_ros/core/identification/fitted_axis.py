@@ -145,7 +145,7 @@ def _direct_misfit(model: AxisModel, drives: Sequence[Array]) -> Misfit:
     direct, errors = DirectInverse(surface), []
     for drive in drives:
         effective = exact.apply(exact.at_rest(), drive)[1]
-        within = np.clip(effective, surface.lower, surface.upper)
+        within = np.clip(effective, *surface.drive_range)
         errors.append(direct.invert(direct.inverse_at_rest(), within)[1] - drive)
     return misfit(np.concatenate(errors))
 

@@ -93,11 +93,11 @@ def _by_band(signal: Array, bands: Sequence[float], sample_period: float) -> Arr
 
 
 def _refuse_beyond(model: AxisModel, drive: Array, name: str) -> None:
-    surface = model.hysteresis.forward
-    if drive.min() < surface.lower or drive.max() > surface.upper:
+    lower, upper = model.hysteresis.forward.drive_range
+    if drive.min() < lower or drive.max() > upper:
         raise InputError(
             f"{name} record: drives {drive.min():.3g} to {drive.max():.3g} V, but the model goes"
-            f" from {surface.lower:.3g} to {surface.upper:.3g} V; keep the drive within these"
+            f" from {lower:.3g} to {upper:.3g} V; keep the drive within these"
         )
 
 

@@ -91,6 +91,11 @@ class DuhemSlopes:
                 )
 
     @property
+    def drive_range(self) -> tuple[float, float]:
+        """Least and greatest input (V) that was identified."""
+        return self.lower, self.upper
+
+    @property
     def grid(self) -> Grid:
         """Lowest input and its cell, lowest distance and its cell, V."""
         (rows, columns), (low, high) = self.rising.shape, self.widths

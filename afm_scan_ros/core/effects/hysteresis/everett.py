@@ -31,6 +31,11 @@ def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a 
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
+def _pair(values: Any) -> tuple[float, float]:  # noqa: ANN401 - whatever holds two numbers
+    lower, upper = values
+    return float(lower), float(upper)
+
+
 @frozen
 class EverettSurface:
     """E(alpha, beta) on a grid: half of what a fall from alpha to beta takes back.
@@ -39,7 +44,8 @@ class EverettSurface:
     F_alpha when the input has risen from ``lower`` to alpha, F_alpha_beta when it has then fallen
     to beta. ``values[i, j]``, shape (n, n), is E at alpha = levels[i], beta = levels[j], valid
     for i ≥ j and zero for i = j. ``offset`` is the output at ``lower``, the negative saturation.
-    The levels are evenly spaced, or those of ``uneven`` (V), shape (n,).
+    The levels are evenly spaced, or those of ``uneven`` (V), shape (n,). Where the surface reaches
+    beyond the inputs that were identified, these have a range of their own, ``within`` (V).
     Between the levels E is bilinear, in the triangles along the diagonal linear. A depolarised
     scanner is as after an oscillation that faded from both limits, its middle at ``bias`` (V) times
     the square of its amplitude over the limit's: what is symmetric in the material need not be so
@@ -55,6 +61,7 @@ class EverettSurface:
     offset: float = field(converter=float)
     bias: float | None = field(default=None, converter=optional(float))
     uneven: Array | None = field(default=None, converter=optional(_matrix), eq=by_value)
+    within: tuple[float, float] | None = field(default=None, converter=optional(_pair))
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)
@@ -63,6 +70,12 @@ class EverettSurface:
         if not self.lower < self.upper or not np.isfinite([self.lower, self.upper]).all():
             raise InputError(f"an Everett surface needs lower < upper: {self.lower}, {self.upper}")
         self._refuse_other_levels()
+        least, most = self.drive_range
+        if not self.lower <= least < most <= self.upper:
+            raise InputError(
+                f"inputs from {least} to {most} V are no range of a surface from {self.lower} to"
+                f" {self.upper} V"
+            )
         below = self.values[np.tril_indices(n)]
         if not np.isfinite([*below, self.offset]).all() or np.diag(self.values).any():
             raise InputError(
@@ -99,6 +112,11 @@ class EverettSurface:
         if self.uneven is not None:
             return self.uneven
         return np.linspace(self.lower, self.upper, len(self.values))
+
+    @property
+    def drive_range(self) -> tuple[float, float]:
+        """Least and greatest input (V) that was identified."""
+        return self.within or (self.lower, self.upper)
 
     @property
     def output_lower(self) -> float:

@@ -170,7 +170,7 @@ class Preisach(CausalInverse):
         self.surface = surface
         self._surface = looked_up(surface.values, surface.levels)
         output = surface.output_lower, surface.output_upper
-        self._limits = {INPUT: (surface.lower, surface.upper), OUTPUT: output}
+        self._limits = {INPUT: surface.drive_range, OUTPUT: output}
 
     def saturated(self) -> Memory:
         """Memory after an excursion to the lower limit, which wipes out everything else."""
@@ -180,19 +180,24 @@ class Preisach(CausalInverse):
     def at_rest(self) -> Memory:
         """Memory after an oscillation from both limits that decayed to zero."""
         oscillation = depolarising(self.surface.lower, self.surface.upper, self.surface.bias)
-        return self.apply(self.saturated(), oscillation)[0]
+        whole = self.surface.lower, self.surface.upper
+        return self._walk(INPUT, self.saturated(), oscillation, whole)[0]
 
     def apply(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
-        return self._walk(INPUT, state, block)
+        return self._walk(INPUT, state, block, self._limits[INPUT])
 
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
-        return self._walk(OUTPUT, state, block)
+        memory, inputs = self._walk(OUTPUT, state, block, self._limits[OUTPUT])
+        refuse_beyond(rounded_into(inputs, *self._limits[INPUT]), *self._limits[INPUT])
+        return memory, inputs
 
-    def _walk(self, given: int, state: Memory, block: Array) -> tuple[Memory, Array]:
+    def _walk(
+        self, given: int, state: Memory, block: Array, limits: tuple[float, float]
+    ) -> tuple[Memory, Array]:
         (*deeper, top), now, done = state.pages, state.now, 0
-        limits, result = self._limits[given], np.empty(len(block))
+        result = np.empty(len(block))
         # A strided block would have the walk compiled anew, which takes seconds.
         block = rounded_into(np.ascontiguousarray(block), *limits)
         while done < len(block):

@@ -157,20 +157,19 @@ def _scaled(wave: Waveform, axis: AxisModel, size: float, time: float) -> Wavefo
     sized = Scaled(wave, size * _half_range(axis) / REFERENCE_VOLTAGE, time)
     if not _unipolar(axis):
         return sized
-    forward = axis.hysteresis.forward
-    return Raised(sized, 0.5 * (forward.upper + forward.lower), RISE * time)
+    lower, upper = axis.hysteresis.forward.drive_range
+    return Raised(sized, 0.5 * (upper + lower), RISE * time)
 
 
 def _half_range(axis: AxisModel) -> float:
     """Largest voltage to both sides of the middle of the drive."""
-    lower, upper = axis.hysteresis.forward.lower, axis.hysteresis.forward.upper
+    lower, upper = axis.hysteresis.forward.drive_range
     return 0.5 * (upper - lower) if _unipolar(axis) else min(-lower, upper)
 
 
 def _unipolar(axis: AxisModel) -> bool:
-    least, largest = sorted(
-        (-axis.hysteresis.forward.lower, axis.hysteresis.forward.upper), key=abs
-    )
+    lower, upper = axis.hysteresis.forward.drive_range
+    least, largest = sorted((-lower, upper), key=abs)
     return least < UNIPOLAR * largest
 
 

@@ -81,7 +81,7 @@ def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverag
 def known_from(model: ScannerModel) -> Coverage:
     """What a model shows of its scanner: its lowest resonance, and its largest slow gain."""
     axes = [model.axis(name) for name in model.axes]
-    swings = [axis.hysteresis.forward.upper - axis.hysteresis.forward.lower for axis in axes]
+    swings = [float(np.ptp(axis.hysteresis.forward.drive_range)) for axis in axes]
     gains = [2.0 * half_range_of(a) / swing for a, swing in zip(axes, swings, strict=True)]
     try:
         resonance = min(first_resonance(axis.vibration).frequency for axis in axes)
