@@ -9,6 +9,7 @@ from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
 from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
@@ -27,6 +28,18 @@ def model_of(fit: AxisFit) -> AxisModel:
     dynamics = fit.layout.dynamics(fit.theta)
     vibration, sensor = dynamics.vibration(fit.gain), fit.layout.sensor_of(fit.theta)
     return AxisModel(_hysteresis(fit), vibration, dynamics.creep(), sensor=sensor)
+
+
+def without_lag(model: AxisModel, fit: AxisFit) -> AxisModel:
+    """Return a model whose vibration is its gain alone, for one of which the records tell nothing.
+
+    A lag that is fitted to samples that hardly show one would make most of the error of a scan that
+    is faster than they are.
+    """
+    shortest = min(one.period for one in fit.records)
+    pole = 1.0 / (fit.layout.settings.unseen_lag * shortest)
+    gain = model.vibration.static_gain
+    return evolve(model, vibration=VibrationModel((gain * pole,), (1.0, pole)))
 
 
 def _hysteresis(fit: AxisFit) -> HysteresisModel:

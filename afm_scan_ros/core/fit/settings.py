@@ -171,6 +171,12 @@ class FitSettings:
         "fast lags, evenly spaced in the logarithm",
         "one lag leaves 0.3 % at 0.1 to 2 kHz",
     )
+    unseen_lag: float = setting(
+        1e-3,
+        "sample",
+        "lag of a model whose vibration no record tells, in samples of the fastest one",
+        "a scan a hundred times as fast sees a tenth of its own sample",
+    )
     slowest_lag: float = setting(
         3.0,
         "1/omega",

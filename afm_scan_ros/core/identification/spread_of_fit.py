@@ -67,8 +67,8 @@ def spread_of(known: Knowledge, model: AxisModel, held_out: Sequence[HeldOut]) -
 def _lost(fit: AxisFit, model: AxisModel) -> float:
     """Mean squared share by which scans of a model and of its fit differ, but for their mean.
 
-    The surface of a drive of one sign lacks the plays that only its first rise moves, and so does
-    the creep behind it. The last cycle counts.
+    The surface of the model has fewer levels than the plays have places, and where it does not grow
+    it is another. The last cycle counts.
     """
     lost, cycle = [], slice(-fit.layout.settings.scan_samples, None)
     for drive, period in scans(fit):
