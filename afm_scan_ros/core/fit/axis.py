@@ -73,6 +73,10 @@ def fit_axis(
             break
         progress("fitting a further mode")
         settle(fit, settings.most_steps, VIBRATION)
+    if len(fit.layout.lacking(fit.theta)[1]):
+        progress("holding the surface of the hysteresis to growth")
+        fit.grows = True
+        settle(fit, settings.most_steps)
     if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit

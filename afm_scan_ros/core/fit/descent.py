@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -81,11 +81,11 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     whole = fit.layout.conditioned(matrix + precision)
     metric = _metric(fit.layout, matrix, precision)
     equations = _Equations(whole, right, free, held, metric)
-    fell = _descend(fit, equations)
+    fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
     mapped = fit.layout.parts["map"]
     if fell == 0.0 and free[mapped].any():
         free[mapped] = False
-        fell = _descend(fit, equations)
+        fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
     return fell + recall(fit) if alone else fell
 
 
@@ -121,12 +121,26 @@ def _metric(layout: Layout, matrix: Array, precision: Array) -> Array:
     return whole
 
 
+def _growing(fit: AxisFit, equations: "_Equations") -> "_Equations":
+    """Add the conditions that the surface of plays grows, of where their moves lead."""
+    lowest, at = fit.layout.lowest() - fit.theta, fit.theta
+    for _ in range(fit.layout.settings.most_trials):
+        rows, lacks = fit.layout.lacking(at)
+        lacks = lacks + rows @ (at - fit.theta)
+        if len(lacks) == 0:
+            break
+        equations = equations.with_conditions(rows, lacks)
+        at = fit.theta + equations.move(0.0, equations.right, lowest)
+    return equations
+
+
 @frozen(eq=False)
 class _Equations:
     """Normal equations with the prior: H is ``matrix``, g is ``right``.
 
     ``free`` parameters move; ``held`` is whether none of them is the operator's. ``metric`` is D
-    of the damping.
+    of the damping, which conditions do not change. Conditions that the start meets are squares all
+    the same: ``unseen`` is what these add to the objective there.
     """
 
     matrix: Array
@@ -134,10 +148,17 @@ class _Equations:
     free: Mask
     held: bool
     metric: Array
+    unseen: float = 0.0
+
+    def with_conditions(self, rows: Array, lacks: Array) -> "_Equations":
+        """Add half the squares of what lacks after a move: ``lacks`` less rows times move."""
+        matrix, right = self.matrix + rows.T @ rows, self.right + rows.T @ lacks
+        unseen = self.unseen + 0.5 * float(np.sum(np.minimum(lacks, 0.0) ** 2))
+        return evolve(self, matrix=matrix, right=right, unseen=unseen)
 
     def foreseen(self, move: Array) -> float:
         """By how much a move lowers the objective, were that quadratic."""
-        return float(move @ self.right - 0.5 * move @ self.matrix @ move)
+        return float(move @ self.right - 0.5 * move @ self.matrix @ move) - self.unseen
 
     def move(self, damping: float, right: Array, lowest: Array) -> Array:
         """Return the move towards ``right`` under a damping, none below its lowest."""

@@ -60,7 +60,7 @@ class AxisFit:
     ``scales`` are standard deviations of priors. ``remaining`` (nat) is by how much the objective
     may still fall: what the last step left of what it would have brought, were the objective
     quadratic. ``quadratic`` is whether it nearly was. The gain stays as the first mode leaves it,
-    for the operator has one.
+    for the operator has one. Where it ``grows``, slopes of plays are held to their least value.
     ``stalled`` is whether steps have become too short to matter, ``damping_alone`` the damping of
     those of the memories alone.
     """
@@ -74,6 +74,7 @@ class AxisFit:
     remaining: float = np.inf
     quadratic: bool = False
     stalled: bool = False
+    grows: bool = False
     damping: float = field()
     damping_alone: float = 1.0
     _columns: dict[int, tuple[Array, list[Columns]]] = field(factory=dict)
@@ -160,6 +161,8 @@ class AxisFit:
         apart = theta - mean
         try:
             total = self.misfit(theta) + 0.5 * float(apart @ precision @ apart)
+            if self.grows:
+                total += 0.5 * float(np.sum(self.layout.lacking(theta)[1] ** 2))
         except InputError:  # the map behind the operator turns back, or a mode does not oscillate
             return np.inf
         return total if np.isfinite(total) else np.inf

@@ -96,7 +96,7 @@ def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap |
     levels = plays.levels(settings.spread_levels)
     fitted, _ = plays.everett(layout.of_operator(fit.theta), levels)
     values, offset = plays.everett(given, levels)
-    values = values - fitted + grown(fitted, levels, settings.least_slope)[0]
+    values = values - fitted + plays.growing(fitted, levels)[0]
     surface = plays.surface_of(values, offset, plays.bias(rest)[0])
     return from_rest(surface, layout.map_of(theta))
 

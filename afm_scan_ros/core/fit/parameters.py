@@ -20,6 +20,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.dynamics import PoleBank
+from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -139,6 +140,17 @@ class Layout:
         if self.delayed:
             result[self.parts["sensor"].stop - 1] = self.least_delay
         return result
+
+    @cached_property
+    def _growth(self) -> Growth | None:
+        return Growth(self.operator) if isinstance(self.operator, Plays) else None
+
+    def lacking(self, theta: Array) -> tuple[Array, Array]:
+        """Conditions that the plays' surface grows, where θ fails them: see ``Growth.lacking``."""
+        if self._growth is None:
+            return np.zeros((0, self.size)), np.zeros(0)
+        rows, lacks = self._growth.lacking(self.of_operator(theta))
+        return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:
         """Return the linear part; raises InputError where a mode would not oscillate."""

@@ -22,7 +22,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown, grown_beyond
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
@@ -332,8 +332,19 @@ class Plays:
         values, offset = self.everett(theta, levels)
         share = 0.0
         if mixed:
-            values, share = grown(values, levels, self.settings.least_slope)
+            values, share = self.growing(values, levels)
         return self.surface_of(values, offset + share * (self.ends[0] - offset), bias)
+
+    def growing(self, values: Array, levels: Array) -> tuple[Array, float]:
+        """Return E (V) at levels (V) that grows, and the share of a straight line mixed in.
+
+        Beyond the range of the drive, which no record tells, it is never less steep than that line.
+        """
+        within = np.flatnonzero((levels >= self.lower) & (levels <= self.upper))
+        inside, result = slice(within[0], within[-1] + 1), values.copy()
+        least = self.settings.least_slope
+        result[inside, inside], share = grown(values[inside, inside], levels[inside], least)
+        return grown_beyond(result, inside, 0.5 * least * (levels[1] - levels[0])), share
 
     def surface_of(self, values: Array, offset: float, bias: float | None) -> EverettSurface:
         """Return the surface of ``everett``, with a ``bias`` (V) as that of ``surface``."""

@@ -99,6 +99,12 @@ class FitSettings:
         "least slope dA/du of a model",
         "only an output that grows has an inverse",
     )
+    slope_tolerance: float = setting(
+        1e-5,
+        "1",
+        "standard deviation by which slopes of plays fall short of least_slope",
+        "a thousandth of least_slope costs 2 nat",
+    )
     map_terms: int = setting(
         4,
         "1",

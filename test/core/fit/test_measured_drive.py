@@ -51,4 +51,4 @@ def test_a_measured_drive_turns_where_the_true_one_does(seed: int, share: float)
     assert len(turns) == len(true)
     assert np.abs(turns - true).max() <= 1 + 20 * sigma / np.abs(np.diff(drive)).min()
     assert len(turns_of(found, 1e-9 * LIMIT)) == len(true)  # and nowhere else
-    assert np.abs(found - drive).max() < 5.0 * sigma
+    assert np.abs(found - drive).max() < 6.0 * sigma  # of 5800 samples

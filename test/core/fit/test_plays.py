@@ -7,10 +7,14 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.descent import settle
+from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.model_of_fit import from_rest
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.types import Array
-from helpers.fit_cases import LIMIT, SETTINGS, levels
+from helpers.fit_cases import GAIN, LIMIT, SETTINGS, levels, of_plays_alone
 
 
 def rest(bank: PlayBank, value: float = 0.0) -> Array:
@@ -69,15 +73,45 @@ def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float
 
 @given(seed=st.integers(0, 10_000), low=st.sampled_from([-LIMIT, 0.0]))
 @settings(max_examples=10)
-def test_a_surface_that_does_not_grow_is_mixed_with_a_line_until_it_does(
-    seed: int, low: float
-) -> None:
+def test_conditions_tell_where_a_surface_does_not_grow(seed: int, low: float) -> None:
+    """They are linear in the weights, and none fails where the model has an inverse."""
     rng, plays = np.random.default_rng(seed), PlayBank(low, LIMIT)
-    theta = plays.unbent()
+    growth, theta = Growth(plays), plays.unbent()
     theta[1:] = rng.normal(0.0, 10.0 ** rng.uniform(-2.0, 0.5), theta.size - 1)
+    rows, lacks = growth.lacking(theta)
+    if len(lacks) == 0:
+        plays.surface(theta)
+        return
+    least = SETTINGS.least_slope / SETTINGS.slope_tolerance
+    if lacks.max() > 1.01 * least:
+        with pytest.raises(InputError, match="does not grow"):
+            plays.surface(theta)
     mixed = plays.surface(theta, mixed=True)
     lowest = 2.0 * np.diff(mixed.values, axis=0)[np.tri(len(mixed.values), dtype=bool)[:-1]].min()
     assert lowest / np.diff(mixed.levels)[0] > 0.99 * SETTINGS.least_slope
+    move = 1e-9 * rng.standard_normal(theta.size)
+    _, moved = growth.lacking(theta + move)
+    np.testing.assert_allclose(moved - lacks, -rows @ move, atol=1e-6 * least)
+
+
+def test_plays_that_no_surface_has_are_held_to_one() -> None:
+    """A response that falls as the drive goes on rising after each turn."""
+    drive = levels(2, 40, 80)
+    operator = PlayBank(-LIMIT, LIMIT)
+    theta = operator.unbent()
+    theta[1 : len(operator.thresholds)] = 0.5
+    theta[12:20] = -12.0
+    with pytest.raises(InputError, match="does not grow"):
+        operator.surface(theta)
+    moved = GAIN * operator.output(theta, drive, rest(operator))
+    fit = AxisFit(*of_plays_alone(drive, moved))
+    settle(fit, 20, ("density", "correction"))
+    with pytest.raises(InputError, match="does not grow"):
+        operator.surface(fit.layout.of_operator(fit.theta))
+    fit.grows = True
+    settle(fit, 20, ("density", "correction"))
+    found = operator.surface(fit.layout.of_operator(fit.theta))
+    assert found.output_upper > found.output_lower
 
 
 @given(seed=st.integers(0, 10_000), low=st.sampled_from([0.0, -0.3 * LIMIT, -LIMIT]))

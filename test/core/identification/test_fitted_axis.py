@@ -123,8 +123,8 @@ def stated_of(found: FittedAxis, drive: Array) -> float:
 
 
 def test_a_motion_is_as_uncertain_as_is_stated(fit: FittedAxis) -> None:
-    """Of a fresh one over nine tenths of the drive, within a factor of two."""
-    assert error_on(fit, FRESH) / 2.0 < stated_of(fit, FRESH) < 2.0 * error_on(fit, FRESH)
+    """Of a fresh one over nine tenths of the drive, within a factor of 2.5."""
+    assert error_on(fit, FRESH) / 2.5 < stated_of(fit, FRESH) < 2.5 * error_on(fit, FRESH)
 
 
 def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:

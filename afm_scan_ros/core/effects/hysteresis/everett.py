@@ -167,6 +167,21 @@ def grown(values: Array, levels: Array, least: float) -> tuple[Array, float]:
     return middle + share * (straight - middle), share
 
 
+def grown_beyond(values: Array, inside: slice, least: float) -> Array:
+    """Return E (n, n) that grows from level to level by ``least`` (V), also beyond those inside.
+
+    Inside, where it grows, it stays as it is.
+    """
+    result, floor = values.copy(), least * np.arange(len(values))
+    for j in range(inside.start - 1, -1, -1):
+        column = np.maximum(result[j + 1 :, j], result[j + 1 :, j + 1] + least)
+        result[j + 1 :, j] = np.maximum.accumulate(column - floor[j + 1 :]) + floor[j + 1 :]
+    for i in range(inside.stop, len(values)):
+        row = np.maximum(result[i, :i], result[i - 1, :i] + least)[::-1]
+        result[i, :i] = (np.maximum.accumulate(row - floor[:i]) + floor[:i])[::-1]
+    return result
+
+
 def _rises(values: Array, inside: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Changes of E from level to level, as alpha rises and as beta falls."""
     return np.diff(values, axis=0)[inside[:-1]], -np.diff(values, axis=1)[inside[:, 1:]]
