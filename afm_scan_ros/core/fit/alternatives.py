@@ -78,6 +78,25 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
     return fit
 
 
+def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return a fit, or one without the lags of all that is seen of its vibration.
+
+    These stay where they have clearly the greater evidence: loops of one rate look like a lag.
+    """
+    if fit.seen_lag is None or fit.seen_lag == 0.0:
+        return fit
+    return _preferred(without_lags(fit), lambda: fit, progress, "a lag of the vibration")
+
+
+def without_lags(fit: AxisFit) -> AxisFit:
+    """Return a fit whose vibration is its gain alone."""
+    shortest = min(one.period for one in fit.records)
+    layout = evolve(fit.layout, lags=np.array([fit.layout.settings.unseen_lag * shortest]))
+    lags = fit.layout.parts["lags"]
+    theta = np.concatenate([fit.theta[: lags.start], [1.0], fit.theta[lags.stop :]])
+    return AxisFit(layout, list(fit.records), fit.gain, theta, fit.discrepancy, fit.scales)
+
+
 def _with_any_sensor(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one with a sensor of its own that has clearly the greater evidence.
 

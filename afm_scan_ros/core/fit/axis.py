@@ -6,7 +6,7 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.alternatives import better, with_rest
+from afm_scan_ros.core.fit.alternatives import better, with_rest, with_told_lags
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
@@ -73,6 +73,7 @@ def fit_axis(
             break
         progress("fitting a further mode")
         settle(fit, settings.most_steps, VIBRATION)
+    fit = with_told_lags(fit, progress)
     if len(fit.layout.lacking(fit.theta)[1]):
         progress("holding the surface of the hysteresis to growth")
         fit.grows = True

@@ -107,6 +107,18 @@ class AxisFit:
         return max(shares) < self.layout.settings.lost
 
     @property
+    def seen_lag(self) -> float | None:
+        """Mean lag (s) where no mode and no sensor is seen; 0 if it is shorter than any sample.
+
+        What rings between slow samples shows in those behind a step, and looks like such lags.
+        """
+        layout, shortest = self.layout, min(one.period for one in self.records)
+        if layout.modes or layout.sensor_order or layout.delayed:
+            return None
+        lag = float(self.theta[layout.parts["lags"]] @ layout.lags)
+        return lag if lag >= shortest else 0.0
+
+    @property
     def sufficient(self) -> bool:
         """Whether the discrepancy is slight, or a small part of what each record varies by."""
         return self.at_noise or self.discrepancy < self.layout.settings.slight

@@ -25,21 +25,20 @@ def model_of(fit: AxisFit) -> AxisModel:
     Where plays found do not grow everywhere, they are mixed with a straight line so far that they
     have an inverse.
     """
-    dynamics = fit.layout.dynamics(fit.theta)
-    vibration, sensor = dynamics.vibration(fit.gain), fit.layout.sensor_of(fit.theta)
-    return AxisModel(_hysteresis(fit), vibration, dynamics.creep(), sensor=sensor)
+    dynamics, sensor = fit.layout.dynamics(fit.theta), fit.layout.sensor_of(fit.theta)
+    return AxisModel(_hysteresis(fit), _vibration(fit), dynamics.creep(), sensor=sensor)
 
 
-def without_lag(model: AxisModel, fit: AxisFit) -> AxisModel:
-    """Return a model whose vibration is its gain alone, for one of which the records tell nothing.
+def _vibration(fit: AxisFit) -> VibrationModel:
+    """Return the vibration of a fit; where its lag is not seen, the gain alone.
 
-    A lag that is fitted to samples that hardly show one would make most of the error of a scan that
-    is faster than they are.
+    Lags that slow samples hardly show would make most of the error of a faster scan.
     """
-    shortest = min(one.period for one in fit.records)
-    pole = 1.0 / (fit.layout.settings.unseen_lag * shortest)
-    gain = model.vibration.static_gain
-    return evolve(model, vibration=VibrationModel((gain * pole,), (1.0, pole)))
+    found = fit.layout.dynamics(fit.theta).vibration(fit.gain)
+    if fit.seen_lag != 0.0:
+        return found
+    pole = 1.0 / (fit.layout.settings.unseen_lag * min(one.period for one in fit.records))
+    return VibrationModel((found.static_gain * pole,), (1.0, pole))
 
 
 def _hysteresis(fit: AxisFit) -> HysteresisModel:

@@ -10,7 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.directions import scans
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.model_of_fit import model_of, without_lag
+from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.signals import in_step, known_from, reads_after
@@ -36,7 +36,7 @@ from afm_scan_ros.core.identification.validation import (
     of_fitted,
     validate_from,
 )
-from afm_scan_ros.core.model import AxisModel, Status
+from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.prediction_error import apart, discrepancy
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
@@ -102,8 +102,6 @@ def identify_axis(
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
     model = evolve(model_of(fit), effects=told.effects())
-    if model.effects.vibration.status is Status.UNKNOWN:
-        model = without_lag(model, fit)
     progress("validating")
     left_out = [_held_out(model, one, axis) for one in held_out]
     validations = [one.validation for one in left_out]
