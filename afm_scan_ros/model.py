@@ -22,7 +22,7 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import ExtensionSettings, extended
+from afm_scan_ros.core.extension import SHARE, extended
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction_error import standard_deviation
@@ -39,9 +39,18 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 MODEL_FILE = "model.yaml"
-BEYOND = ("refuse", "extend")
-EXTENDED = f"{ExtensionSettings().share:.0%}"
+BEYOND = {"refuse": 0.0, "extend": SHARE}
+"""Shares by which a drive may leave the identified range."""
 UNLIMITED = DriveLimits(float("inf"), float("inf"))
+
+
+def _share_of(beyond: str | float) -> float:
+    """Return the share by which a drive may leave the identified range; raises InputError."""
+    if isinstance(beyond, str) and beyond in BEYOND:
+        return BEYOND[beyond]
+    if isinstance(beyond, str):
+        raise InputError(f"beyond is {beyond!r}: give {', '.join(BEYOND)} or a number, as 0.5")
+    return positive("beyond", beyond, "as 0.5 for a half more")
 
 
 @frozen(eq=False)
@@ -119,7 +128,7 @@ class Model:
         drive: ArrayLike,
         sample_period: float,
         *,
-        beyond: str = ...,
+        beyond: str | float = ...,
         return_std: Literal[False] = ...,
         periodic: bool = ...,
     ) -> Array: ...
@@ -130,7 +139,7 @@ class Model:
         drive: ArrayLike,
         sample_period: float,
         *,
-        beyond: str = ...,
+        beyond: str | float = ...,
         return_std: Literal[True],
         periodic: bool = ...,
     ) -> tuple[Array, Array]: ...
@@ -140,7 +149,7 @@ class Model:
         drive: ArrayLike,
         sample_period: float,
         *,
-        beyond: str = "refuse",
+        beyond: str | float = "refuse",
         return_std: bool = False,
         periodic: bool = False,
     ) -> Array | tuple[Array, Array]:
@@ -154,7 +163,8 @@ class Model:
             s.
         beyond
             "refuse" a drive that leaves the identified range, or "extend" that range by a tenth of
-            the voltage at either end: branches go on with the slopes that they have there.
+            the voltage at either end, or a number, as 0.5 for a half of it: branches go on with the
+            slopes that they have there.
         return_std
             Whether to return the standard deviation of the prediction too.
         periodic
@@ -188,10 +198,9 @@ class Model:
         >>> bool(std[:, 0].max() < 1e-2 * np.ptp(moved[:, 0]))
         True
         """
-        if beyond not in BEYOND:
-            raise InputError(f"beyond is {beyond!r}: give one of {', '.join(BEYOND)}")
+        share = _share_of(beyond)
         if not isinstance(self._scanner, ScannerModel):
-            if return_std or beyond != BEYOND[0]:
+            if return_std or share:
                 raise InputError(
                     "a model of coupled axes predicts neither beyond its range nor a standard"
                     " deviation: leave out beyond and return_std"
@@ -202,11 +211,11 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
-        model = self.scanner if beyond == BEYOND[0] else extended(self.scanner, given)
+        model = extended(self.scanner, given, share) if share else self.scanner
         try:
             moved = predict(model, given)
         except BeyondRangeError as error:
-            farther = "" if beyond == BEYOND[0] else f", of which {EXTENDED} more may be predicted"
+            farther = f", of which {share:.0%} more may be predicted" if share else ""
             raise InputError(
                 f"drive is {error.value:.4g} V at sample {error.sample}, and the model was"
                 f" identified to {error.limit:.4g} V{farther}: give a smaller drive"
@@ -214,7 +223,7 @@ class Model:
         if not return_std:
             return self._like(drive, moved)
         return self._like(drive, moved), self._like(
-            drive, standard_deviation(self.scanner, given, moved)
+            drive, standard_deviation(self.scanner, given, moved, share or SHARE)
         )
 
     def invert(

@@ -4,6 +4,8 @@ Branches go on with the slopes that they have at the ends of the range. How much
 adds is unknown by as much as these slopes differ from the mean one.
 """
 
+import math
+
 import numpy as np
 from attrs import evolve, frozen
 
@@ -27,28 +29,32 @@ class ExtensionSettings:
     )
 
 
-def extended(model: ScannerModel, drive: Trace) -> ScannerModel:
+SHARE = ExtensionSettings().share
+
+
+def extended(model: ScannerModel, drive: Trace, share: float = SHARE) -> ScannerModel:
     """Return the model with a wider range for each axis whose drive (V) leaves the identified one.
 
-    Where a drive goes farther than predictions do, the range stays, and does not hold it.
+    It is wider by a share of the voltages at its ends. Where a drive goes farther, the range stays,
+    and does not hold it.
     """
-    axes = {name: extended_axis(model.axis(name), getattr(drive, name)) for name in model.axes}
+    axes = {n: extended_axis(model.axis(n), getattr(drive, n), share) for n in model.axes}
     return evolve(model, **axes)
 
 
-def extended_axis(model: AxisModel, drive: Array) -> AxisModel:
+def extended_axis(model: AxisModel, drive: Array, share: float = SHARE) -> AxisModel:
     """Return the same of one axis, whose drive (V) is of shape (n,)."""
     forward = model.hysteresis.forward
     lower, upper = forward.drive_range
-    lowest, highest = _farther(lower, upper)
+    lowest, highest = _farther(lower, upper, share)
     if _within(drive, lower, upper) or not _within(drive, lowest, highest):
         return model
-    return evolve(model, hysteresis=evolve(model.hysteresis, forward=_wider(forward)))
+    return evolve(model, hysteresis=evolve(model.hysteresis, forward=_wider(forward, share)))
 
 
-def _farther(lower: float, upper: float) -> tuple[float, float]:
-    """Return voltages (V) of which those away from 0 V are exceeded."""
-    grown = 1.0 + ExtensionSettings().share
+def _farther(lower: float, upper: float, share: float) -> tuple[float, float]:
+    """Return voltages (V) of which those away from 0 V are exceeded by a share."""
+    grown = 1.0 + share
     return min(lower, grown * lower), max(upper, grown * upper)
 
 
@@ -56,13 +62,13 @@ def _within(drive: Array, lower: float, upper: float) -> bool:
     return bool(np.all((drive >= lower) & (drive <= upper)))
 
 
-def unknown_beyond(model: AxisModel, drive: Array) -> Array:
+def unknown_beyond(model: AxisModel, drive: Array, share: float = SHARE) -> Array:
     """How far a slow prediction (m), (n,), is from a straight line where it is beyond the range."""
     forward = model.hysteresis.forward
     inside = np.clip(drive, *forward.drive_range)
     if np.array_equal(inside, drive):
         return np.zeros(len(drive))
-    effects = effect_of(_wider(forward)), effect_of(forward)
+    effects = effect_of(_wider(forward, share)), effect_of(forward)
     within, at_ends = (
         effect.apply(effect.at_rest(), at)[1]
         for effect, at in zip(effects, (drive, inside), strict=True)
@@ -71,16 +77,18 @@ def unknown_beyond(model: AxisModel, drive: Array) -> Array:
     return np.asarray(np.abs(model.vibration.static_gain * bent))
 
 
-def _wider(operator: HysteresisOperator) -> HysteresisOperator:
-    return _slopes(operator) if isinstance(operator, DuhemSlopes) else _surface(operator)
+def _wider(operator: HysteresisOperator, share: float) -> HysteresisOperator:
+    if isinstance(operator, DuhemSlopes):
+        return _slopes(operator, share)
+    return _surface(operator, share)
 
 
-def _surface(surface: EverettSurface) -> EverettSurface:
+def _surface(surface: EverettSurface, share: float) -> EverettSurface:
     """Add a level above an upper end over 0 V, and one below a lower end under 0 V.
 
     Up to these E goes on straight. The output at depolarised rest stays the same.
     """
-    grown = 1.0 + ExtensionSettings().share
+    grown = 1.0 + share
     levels, values = surface.levels, np.tril(surface.values)
     if surface.upper > 0.0:
         levels, values = _with_level(levels, values, grown * surface.upper)
@@ -89,7 +97,7 @@ def _surface(surface: EverettSurface) -> EverettSurface:
         turned = _with_level(-levels[::-1], values[::-1, ::-1].T, -grown * surface.lower)
         levels, values = -turned[0][::-1], turned[1][::-1, ::-1].T
     bias = None if surface.bias is None else grown**2 * surface.bias
-    within = None if surface.within is None else _farther(*surface.within)
+    within = None if surface.within is None else _farther(*surface.within, share)
     wider = EverettSurface(levels[0], levels[-1], values, surface.offset, bias, levels, within)
     rests = [Preisach(one).at_rest().now[1] for one in (surface, wider)]
     return evolve(wider, offset=surface.offset + rests[0] - rests[1])
@@ -103,13 +111,13 @@ def _with_level(levels: Array, values: Array, upper: float) -> tuple[Array, Arra
     return np.append(levels, upper), np.vstack([np.pad(values, ((0, 0), (0, 1))), [*last, 0.0]])
 
 
-def _slopes(slopes: DuhemSlopes) -> DuhemSlopes:
-    """Add a cell beyond either end, of the slopes on the edge."""
+def _slopes(slopes: DuhemSlopes, share: float) -> DuhemSlopes:
+    """Add as many cells beyond either end as are needed, of the slopes on the edge."""
     _, cell, *_ = slopes.grid
-    rising, falling = (
-        np.pad(each, ((1, 1), (0, 0)), mode="edge") for each in (slopes.rising, slopes.falling)
-    )
-    centre = np.pad(slopes.centre, 1, mode="edge")
-    ends = slopes.lower - cell, slopes.upper + cell
+    count = math.ceil(share * max(map(abs, slopes.drive_range)) / cell)
+    more = (count, count), (0, 0)
+    rising, falling = (np.pad(each, more, mode="edge") for each in (slopes.rising, slopes.falling))
+    centre = np.pad(slopes.centre, count, mode="edge")
+    ends = slopes.lower - count * cell, slopes.upper + count * cell
     wider = DuhemSlopes(*ends, 0.0, slopes.rest, slopes.widths, centre, rising, falling)
     return evolve(wider, offset=slopes.offset - wider.height(slopes.lower))

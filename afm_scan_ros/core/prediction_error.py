@@ -7,21 +7,26 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import extended_axis, unknown_beyond
+from afm_scan_ros.core.extension import SHARE, extended_axis, unknown_beyond
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread, Variant
 from afm_scan_ros.core.types import Array, Trace
 
 
-def standard_deviation(model: ScannerModel, drive: Trace, moved: Trace) -> Trace:
+def standard_deviation(
+    model: ScannerModel, drive: Trace, moved: Trace, share: float = SHARE
+) -> Trace:
     """Standard deviation (m) of a motion predicted for a drive (V), without the sensor's noise.
 
-    It is more where the drive leaves the identified range. Of a model without a ``Spread`` it is
-    the rms error of the whole motion. Raises InputError where an axis states no error.
+    It is more where the drive leaves the identified range, by a share at most. Of a model without a
+    ``Spread`` it is the rms error of the whole motion. Raises InputError where an axis states no
+    error.
     """
     found = {
-        name: _of_axis(model, name, getattr(drive, name), getattr(moved, name), drive.sample_period)
+        name: _of_axis(
+            model, name, getattr(drive, name), getattr(moved, name), drive.sample_period, share
+        )
         for name in model.axes
     }
     still = np.zeros_like(moved.x)
@@ -29,26 +34,28 @@ def standard_deviation(model: ScannerModel, drive: Trace, moved: Trace) -> Trace
 
 
 def _of_axis(
-    model: ScannerModel, name: str, drive: Array, moved: Array, sample_period: float
+    model: ScannerModel, name: str, drive: Array, moved: Array, sample_period: float, share: float
 ) -> Array:
     axis = model.axis(name)
-    beyond = unknown_beyond(axis, drive)
+    beyond = unknown_beyond(axis, drive, share)
     if axis.spread is None:
         return np.asarray(np.hypot(_of_records(axis, name, moved, sample_period), beyond))
-    known = np.sum(apart(axis, axis.spread, drive, sample_period) ** 2, axis=0)
+    known = np.sum(apart(axis, axis.spread, drive, sample_period, share) ** 2, axis=0)
     left = discrepancy(axis.spread, moved, sample_period)
     return np.asarray(np.sqrt(known + left**2 + beyond**2))
 
 
-def apart(axis: AxisModel, spread: Spread, drive: Array, sample_period: float) -> Array:
+def apart(
+    axis: AxisModel, spread: Spread, drive: Array, sample_period: float, share: float = SHARE
+) -> Array:
     """What a standard deviation in each direction adds to a prediction (m), (directions, n).
 
     Effects that were added to the axis are left out: they change it by far less than it is.
     """
-    middle = _moved(axis, spread.centre, drive, sample_period)
+    middle = _moved(axis, spread.centre, drive, sample_period, share)
     return np.array(
         [
-            (_moved(axis, one, drive, sample_period) - middle) / one.deviations
+            (_moved(axis, one, drive, sample_period, share) - middle) / one.deviations
             for one in spread.directions
         ]
     ).reshape(-1, len(drive))
@@ -59,7 +66,9 @@ def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:
     return float(np.linalg.norm(spread.shares * rms_by_band(moved, spread.bands, sample_period)))
 
 
-def _moved(axis: AxisModel, variant: Variant, drive: Array, sample_period: float) -> Array:
+def _moved(
+    axis: AxisModel, variant: Variant, drive: Array, sample_period: float, share: float
+) -> Array:
     other = evolve(
         axis,
         hysteresis=evolve(axis.hysteresis, forward=variant.forward, output=variant.output),
@@ -68,7 +77,7 @@ def _moved(axis: AxisModel, variant: Variant, drive: Array, sample_period: float
         sensor=variant.sensor,
         added=(),
     )
-    cascade = forward(extended_axis(other, drive), sample_period)
+    cascade = forward(extended_axis(other, drive, share), sample_period)
     return cascade.apply(cascade.at_rest(), drive)[1]
 
 

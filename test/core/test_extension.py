@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
-from afm_scan_ros.core.extension import ExtensionSettings, extended_axis, unknown_beyond
+from afm_scan_ros.core.extension import SHARE, extended_axis, unknown_beyond
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array, channels_of
 from helpers.in_process import ALL, default_model, scan
 
-SHARE, PERIOD = ExtensionSettings().share, 1e-4
+PERIOD, KINDS = 1e-4, ("surface", "one state")
 
 
 def slopes() -> DuhemSlopes:
@@ -36,7 +36,7 @@ def output(operator: HysteresisOperator, drive: Array) -> Array:
     return np.asarray(effect.apply(effect.at_rest(), drive)[1])
 
 
-@pytest.mark.parametrize("kind", ["surface", "one state"])
+@pytest.mark.parametrize("kind", KINDS)
 @given(seed=st.integers(0, 1000))
 def test_nothing_changes_within_the_range(kind: str, seed: int) -> None:
     given_model = model(kind)
@@ -47,7 +47,7 @@ def test_nothing_changes_within_the_range(kind: str, seed: int) -> None:
     np.testing.assert_allclose(outer, inner, atol=1e-3 * np.ptp(inner))
 
 
-@pytest.mark.parametrize("kind", ["surface", "one state"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_branches_go_on_with_the_slope_at_the_end(kind: str) -> None:
     wider = extended_axis(model(kind), np.array([4.4]))
     for end in (1.0, -1.0):
@@ -93,5 +93,22 @@ def test_a_model_that_states_no_error_has_no_deviation() -> None:
     silent = afm.Model(ScannerModel(x=axis), "a test")
     with pytest.raises(afm.InputError, match="states no error"):
         silent.predict(np.zeros(100), PERIOD, return_std=True)
-    with pytest.raises(afm.InputError, match="give one of refuse, extend"):
+    with pytest.raises(afm.InputError, match="give refuse, extend or a number"):
         silent.predict(np.zeros(100), PERIOD, beyond="clip")
+    for number in (0.0, -0.1, np.nan):
+        with pytest.raises(afm.InputError, match="give a positive number"):
+            silent.predict(np.zeros(100), PERIOD, beyond=number)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_prediction_goes_as_far_as_is_asked(kind: str) -> None:
+    """The farther it is from what was identified, the less is known of it."""
+    given_model = afm.Model(ScannerModel(x=model(kind)), "a test")
+    wave = np.sin(np.linspace(0.0, 2.0 * np.pi, 2000))
+    with pytest.raises(afm.InputError, match="50% more may be predicted"):
+        given_model.predict(6.2 * wave, PERIOD, beyond=0.5)
+    moved, std = given_model.predict(5.9 * wave, PERIOD, beyond=0.5, return_std=True)
+    nearer, known = given_model.predict(4.3 * wave, PERIOD, beyond=0.5, return_std=True)
+    assert np.isfinite(moved).all()
+    assert np.ptp(moved) > 1.2 * np.ptp(nearer)
+    assert std.max() > known.max()
