@@ -93,7 +93,7 @@ def _left_out(model: AxisModel, spread: Spread, one: HeldOut) -> MissedMotion:
     period, part = one.record.sample_period, slice(one.first, None)
     drive, displacement = one.record.signals(one.record.axes[0])
     explained = np.var(apart(model, spread, drive, period)[:, part], axis=1).sum()
-    left = one.validation.residual[part]
+    left = one.validation.residual  # from there on
     error = float(np.var(left)) - noise_of(left) ** 2
     moved = rms_by_band(displacement[part], spread.bands, period)
     return MissedMotion(

@@ -34,21 +34,23 @@ def model(known: Knowledge) -> AxisModel:
     return model_of(known.fit)
 
 
-def left_out(model: AxisModel, drive: np.ndarray, error: float) -> HeldOut:
-    """Return a record that the model misses by a share of the motion."""
+def left_out(model: AxisModel, drive: np.ndarray, error: float, first: int = 0) -> HeldOut:
+    """Return a record that the model misses by a share of the motion, from a sample on."""
     before = np.concatenate([[0.0], drive[:-1]])
     noise = np.random.default_rng(6).normal(0.0, NOISE, len(drive))
     moved = (1.0 + error) * GAIN * before + noise
     record = afm.Record(drive, moved, PERIOD, start="depolarised", name="left out")
-    return HeldOut(record, 0, validate_from(model, record, 0))
+    return HeldOut(record, first, validate_from(model, record, first))
 
 
+@pytest.mark.parametrize("first", [0, 4000, 7000])
 def test_a_record_held_out_says_what_is_missed_where_it_moves(
-    known: Knowledge, model: AxisModel
+    known: Knowledge, model: AxisModel, first: int
 ) -> None:
+    """Also where its memory is known late."""
     drive = 3.0 * np.sin(2.0 * np.pi * 20.0 * PERIOD * np.arange(10_000))
     alone, with_record = (
-        spread_of(known, model, given) for given in ([], [left_out(model, drive, 0.02)])
+        spread_of(known, model, given) for given in ([], [left_out(model, drive, 0.02, first)])
     )
     place = int(np.searchsorted(with_record.bands, 20.0)) - 1
     assert with_record.shares[place] == pytest.approx(0.02, rel=0.05)
