@@ -1,6 +1,7 @@
 """The records of one axis → its fit: the order in which parameters are released."""
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from attrs import evolve
@@ -8,8 +9,10 @@ from attrs import evolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.alternatives import better, with_rest, with_told_lags
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
+from afm_scan_ros.core.fit.directions import lost_by
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
+from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.modes import add_first_mode, add_mode
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
@@ -76,8 +79,7 @@ def fit_axis(
     fit = with_told_lags(fit, progress)
     if len(fit.layout.lacking(fit.theta)[1]):
         progress("holding the surface of the hysteresis to growth")
-        fit.grows = True
-        settle(fit, settings.most_steps)
+        fit = _held_to_growth(fit)
     if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
@@ -103,6 +105,15 @@ def _of_plays(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     settle(fit, settings.stage_steps, searching=True)
     fit.find_tones()
     return with_rest(fit, progress)
+
+
+def _held_to_growth(fit: AxisFit) -> AxisFit:
+    """Return a fit whose surface grows, unless that costs more than mixing it with a line does."""
+    held = copy(fit)
+    held.records, held.grows = list(fit.records), True
+    settle(held, held.layout.settings.most_steps)
+    lost = lost_by(model_of(fit), fit)
+    return held if held.discrepancy**2 < fit.discrepancy**2 + lost else fit
 
 
 def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:

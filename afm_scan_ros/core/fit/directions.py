@@ -20,6 +20,8 @@ from afm_scan_ros.core.fit.sensitivity import jacobian
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.simulation import Simulation, simulate
 from afm_scan_ros.core.fit.starts import rest_of
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
 
@@ -104,3 +106,17 @@ def _along(fit: AxisFit, move: Array) -> Variant:
         except InputError:
             deviations *= 0.5
     raise InputError("the fit's own effects have no inverse, or are not stable")
+
+
+def lost_by(model: AxisModel, fit: AxisFit) -> float:
+    """Mean squared share by which scans of a model and of its fit differ, but for their mean.
+
+    The surface of the model has fewer levels than the plays have places, and where it does not grow
+    it is another. The last cycle counts.
+    """
+    lost, cycle = [], slice(-fit.layout.settings.scan_samples, None)
+    for drive, period in scans(fit):
+        cascade, own = forward(model, period), fit.gain * from_rest(fit, drive, period).output
+        apart_by = cascade.apply(cascade.at_rest(), drive)[1] - own
+        lost.append(np.var(apart_by[cycle]) / np.var(own[cycle]))
+    return float(np.mean(lost))

@@ -19,15 +19,13 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
-from afm_scan_ros.core.fit.directions import from_rest, scans
-from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.directions import lost_by
 from afm_scan_ros.core.fit.signals import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.model import AxisModel, band_edges
 from afm_scan_ros.core.prediction_error import apart
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array
 
@@ -61,21 +59,7 @@ def spread_of(known: Knowledge, model: AxisModel, held_out: Sequence[HeldOut]) -
     fitted = _fitted(known, bands)
     shares = _by_band(fitted, np.full(len(bands) - 1, max(one.squared for one in fitted)))
     shares = _by_band([_left_out(model, spread, one) for one in held_out], shares)
-    return evolve(spread, shares=np.sqrt(least**2 + _lost(known.fit, model) + shares))
-
-
-def _lost(fit: AxisFit, model: AxisModel) -> float:
-    """Mean squared share by which scans of a model and of its fit differ, but for their mean.
-
-    The surface of the model has fewer levels than the plays have places, and where it does not grow
-    it is another. The last cycle counts.
-    """
-    lost, cycle = [], slice(-fit.layout.settings.scan_samples, None)
-    for drive, period in scans(fit):
-        cascade, own = forward(model, period), fit.gain * from_rest(fit, drive, period).output
-        apart_by = cascade.apply(cascade.at_rest(), drive)[1] - own
-        lost.append(np.var(apart_by[cycle]) / np.var(own[cycle]))
-    return float(np.mean(lost))
+    return evolve(spread, shares=np.sqrt(least**2 + lost_by(model, known.fit) + shares))
 
 
 def _fitted(known: Knowledge, bands: Sequence[float]) -> list[MissedMotion]:
