@@ -188,8 +188,7 @@ def test_axes_driven_one_after_the_other_are_both_identified(tmp_path: Path) -> 
 
 @pytest.mark.evidence
 def test_a_scanner_of_one_state_is_told_from_plays_whatever_its_start(tmp_path: Path) -> None:
-    drives = {name: drive for name, drive in calibration().items() if name != "steps"}
-    *fitted, check = written(tmp_path, drives, Stage(hysteresis=of_bouc_wen))
+    *fitted, check = written(tmp_path, calibration(), Stage(hysteresis=of_bouc_wen))
     done = run([*fitted, "--validation", check], tmp_path / "model.yaml")
     assert done.exit_code == 0, done.exception
     assert "one state has" in done.output
