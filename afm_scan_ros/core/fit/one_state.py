@@ -153,7 +153,8 @@ class OneState:
             for done in range(self.settings.start_rounds):
                 if done:
                     matrix, right = self._stepped(paths, theta)
-                theta = np.linalg.solve(matrix + strength * prior, right)
+                # Paths without a loop leave slopes free, and hardly a prior to scale.
+                theta = np.linalg.lstsq(matrix + strength * prior, right, rcond=None)[0]
                 theta = np.clip(theta, self.lowest, self.settings.slopes)
             found.append(theta)
         return [*found, self.unbent()]
