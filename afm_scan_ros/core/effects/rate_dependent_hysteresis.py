@@ -21,7 +21,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.effects.base import CausalInverse, Element
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond, reversible
+from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, reversible
 from afm_scan_ros.core.effects.hysteresis.preisach import Memory, Preisach
 from afm_scan_ros.core.effects.hysteresis.walk import (
     INPUT,
@@ -125,7 +125,7 @@ class RateDependentHysteresis(CausalInverse):
 
     def apply(self, state: State, block: Array) -> tuple[State, Array]:
         """Effective inputs F (V) for a block of inputs u (V), both (n,)."""
-        refuse_beyond(block, *self._preisach.surface.drive_range)
+        self._preisach.surface.refuse_other_inputs(block)
         end, late = self._lag.apply(state[1], block)
         memory, forced = self._preisach.apply(state[0], late)
         return (memory, end), forced + self._straight(block) - self._straight(late)
@@ -143,6 +143,7 @@ class RateDependentHysteresis(CausalInverse):
             result,
         )
         refuse_unsolved(found, block, result)
+        self._preisach.surface.refuse_other_inputs(result)
         return (Memory((stack[:, :depth].copy(),), now), np.array([end])), result
 
     def _straight(self, inputs: Array) -> Array:

@@ -329,6 +329,7 @@ class ViscousPlays(CausalInverse):
             result,
         )
         refuse_unsolved(found, block, result)
+        self._preisach.surface.refuse_other_inputs(result)
         return (Memory((stack[:, :depth].copy(),), now), blocks), result
 
     def _place(self, inputs: Array) -> Array:

@@ -250,3 +250,21 @@ def test_an_inverse_whose_steps_do_not_suffice_is_refused(
     monkeypatch.setattr(module, "_invert", vars(module)["_invert"].py_func)
     with pytest.raises(ScanError, match=r"^sample 0 of the block: no drive was found"):
         effect.invert(effect.inverse_at_rest(), wanted)
+
+
+@pytest.mark.parametrize("kind", ["preisach", "late", "viscous"])
+def test_no_inverse_leaves_the_inputs_that_were_identified(kind: str) -> None:
+    """Of a drive of one sign, although the surface holds the memory of the other."""
+    surface = evolve(SURFACE, within=(0.0, SURFACE.upper))
+    effect = {
+        "preisach": lambda: Preisach(surface),
+        "late": lambda: RateDependentHysteresis(surface, 1e-3, PERIOD),
+        "viscous": lambda: ViscousPlays(surface, 1e-3, PERIOD),
+    }[kind]()
+    inputs = np.concatenate([np.linspace(0.0, 3.0, 60), np.linspace(3.0, 0.5, 60)])
+    outputs = effect.apply(effect.at_rest(), inputs)[1]
+    back = effect.invert(effect.inverse_at_rest(), outputs)[1]
+    np.testing.assert_allclose(back, inputs, atol=1e-6)
+    lower = np.append(outputs, np.linspace(outputs[-1], outputs[0] - 1.0, 60))
+    with pytest.raises(BeyondRangeError):
+        effect.invert(effect.inverse_at_rest(), lower)

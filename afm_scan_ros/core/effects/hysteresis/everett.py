@@ -118,6 +118,10 @@ class EverettSurface:
         """Least and greatest input (V) that was identified."""
         return self.within or (self.lower, self.upper)
 
+    def refuse_other_inputs(self, inputs: Array) -> None:
+        """Raise BeyondRangeError at the first of inputs (V), (n,), that was not identified."""
+        refuse_beyond(rounded_into(inputs, *self.drive_range), *self.drive_range)
+
     @property
     def output_lower(self) -> float:
         """Output at negative saturation."""

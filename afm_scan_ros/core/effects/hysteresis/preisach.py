@@ -190,7 +190,7 @@ class Preisach(CausalInverse):
     def invert(self, state: Memory, block: Array) -> tuple[Memory, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
         memory, inputs = self._walk(OUTPUT, state, block, self._limits[OUTPUT])
-        refuse_beyond(rounded_into(inputs, *self._limits[INPUT]), *self._limits[INPUT])
+        self.surface.refuse_other_inputs(inputs)
         return memory, inputs
 
     def _walk(
