@@ -10,6 +10,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import ScanError
+from afm_scan_ros.core.fit.delays import by_whole_samples, read_late
 from afm_scan_ros.core.fit.descent import LINEAR, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
@@ -19,11 +20,9 @@ from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.fit.simulation import at_rest
 from afm_scan_ros.core.fit.starts import (
     begun_at_rest,
-    by_whole_samples,
     counted_whole,
     each_of_own_start,
     evidence_left_out,
-    read_late,
 )
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import ProgressCallback
@@ -79,19 +78,19 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
 
 
 def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
-    """Return a fit, or one without the lags of all that is seen of its vibration.
+    """Return a fit, or one without lags where these are all that there is of its vibration.
 
-    These stay where they have clearly the greater evidence: loops of one rate look like a lag.
+    They stay where they have clearly the greater evidence, for loops of one rate look like a lag,
+    and where they are hidden between samples: there the model leaves them out.
     """
-    if fit.seen_lag is None or fit.seen_lag == 0.0:
+    if not fit.lags_alone or fit.hidden_lag:
         return fit
     return _preferred(without_lags(fit), lambda: fit, progress, "a lag of the vibration")
 
 
 def without_lags(fit: AxisFit) -> AxisFit:
     """Return a fit whose vibration is its gain alone."""
-    shortest = min(one.period for one in fit.records)
-    layout = evolve(fit.layout, lags=np.array([fit.layout.settings.unseen_lag * shortest]))
+    layout = evolve(fit.layout, lags=np.array([fit.layout.settings.unseen_lag * fit.shortest]))
     lags = fit.layout.parts["lags"]
     theta = np.concatenate([fit.theta[: lags.start], [1.0], fit.theta[lags.stop :]])
     return AxisFit(layout, list(fit.records), fit.gain, theta, fit.discrepancy, fit.scales)
@@ -190,15 +189,34 @@ def _lead(fit: AxisFit, other: AxisFit, groups: Sequence[str], handicap: float) 
 def with_sensor(fit: AxisFit, order: int, *, delayed: bool = False) -> AxisFit | None:
     """Return the fit with a sensor that lags as much as its vibration as read does.
 
-    Its low-pass is of an ``order``, or none. It takes the place of the lags. Where the fit has no
-    mode, one that the sensor hid is sought. Returns None where nothing lags, or where the sensor
-    explains hardly anything of what is left while the operator is held.
+    Its low-pass is of an ``order``, or none. Where the fit has no mode, one that the sensor hid is
+    sought. Returns None where nothing lags, or where the sensor explains hardly anything of what is
+    left while the operator is held.
     """
-    settings, read = fit.layout.settings, fit.layout.dynamics(fit.theta).read()
-    unit = SensorModel(order, 1.0 if order else None)
+    settings, other = fit.layout.settings, _behind_sensor(fit, order, delayed=delayed)
+    if other is None:
+        return None
+    enough = np.sqrt(1.0 - settings.mode_share) * fit.discrepancy
+    hopeful = partial(_settled_while_hopeful, enough=enough if fit.layout.modes else np.inf)
+    try:
+        every = [hopeful(other)]
+        if delayed:
+            every += map(hopeful, by_whole_samples(every[0]))
+        other = min(every, key=lambda each: each.discrepancy)
+        if other.layout.modes == 0:
+            every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
+            other = min([other, *every], key=lambda each: each.discrepancy)
+    except ScanError:
+        return None
+    return other if other.discrepancy < enough else None
+
+
+def _behind_sensor(fit: AxisFit, order: int, *, delayed: bool) -> AxisFit | None:
+    """Return the fit with a sensor in the place of its lags; None where nothing lags by as much."""
+    read, unit = fit.layout.dynamics(fit.theta).read(), SensorModel(order, 1.0 if order else None)
     lag, of_unit = (-float(np.sum((b.weights / b.poles).real)) for b in (read, unit))
     corner = of_unit / max(lag, np.finfo(float).tiny)
-    if lag <= 0.0 or corner > 0.5 / min(one.period for one in fit.records):
+    if lag <= 0.0 or corner > 0.5 / fit.shortest:
         return None
     laid = evolve(fit.layout, sensor_order=order, delayed=delayed)
     other = AxisFit(laid, list(fit.records), fit.gain, laid.start(), fit.discrepancy)
@@ -208,19 +226,7 @@ def with_sensor(fit: AxisFit, order: int, *, delayed: bool = False) -> AxisFit |
     delay = fit.layout.delay_of(fit.theta) + (0.0 if order else lag)
     chain = [np.log(corner)] if order else []
     other.theta[laid.parts["sensor"]] = [*chain, delay] if delayed else chain
-    enough = np.sqrt(1.0 - settings.mode_share) * fit.discrepancy
-    try:
-        hopeful = partial(_settled_while_hopeful, enough=enough if laid.modes else np.inf)
-        other = hopeful(other)
-        if delayed:
-            every = [other, *map(hopeful, by_whole_samples(other))]
-            other = min(every, key=lambda each: each.discrepancy)
-        if laid.modes == 0:
-            every = [_refitted(other, each) for each in further_modes(other, settings.tried_modes)]
-            other = min([other, *every], key=lambda each: each.discrepancy)
-    except ScanError:
-        return None
-    return other if other.discrepancy < enough else None
+    return other
 
 
 def _settled_while_hopeful(fit: AxisFit, enough: float) -> AxisFit:

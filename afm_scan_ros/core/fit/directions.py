@@ -68,7 +68,7 @@ def scans(fit: AxisFit) -> Iterator[tuple[Array, float]]:
     wave = np.interp(place, np.arange(10.0), [0.0, *2 * [0.0, 1.0, 0.0, -1.0], 0.0])
     risen = np.minimum(place, 1.0)
     longest = max(len(one.drive) * one.period for one in fit.records)
-    for period in (min(one.period for one in fit.records), longest / len(place)):
+    for period in (fit.shortest, longest / len(place)):
         for halved in range(settings.spread_sizes):
             drive = middle * risen + 0.5**halved * operator.half * wave
             yield np.clip(drive, operator.lower, operator.upper), period

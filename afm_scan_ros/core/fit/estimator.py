@@ -107,16 +107,24 @@ class AxisFit:
         return max(shares) < self.layout.settings.lost
 
     @property
-    def seen_lag(self) -> float | None:
-        """Mean lag (s) where no mode and no sensor is seen; 0 if it is shorter than any sample.
+    def shortest(self) -> float:
+        """Sample period of the fastest record, s."""
+        return min(one.period for one in self.records)
+
+    @property
+    def lags_alone(self) -> bool:
+        """Whether lags are all that there is of vibration and sensor."""
+        layout = self.layout
+        return not (layout.modes or layout.sensor_order or layout.delayed)
+
+    @property
+    def hidden_lag(self) -> bool:
+        """Whether the mean lag is shorter than any sample, where lags are all that there is.
 
         What rings between slow samples shows in those behind a step, and looks like such lags.
         """
-        layout, shortest = self.layout, min(one.period for one in self.records)
-        if layout.modes or layout.sensor_order or layout.delayed:
-            return None
-        lag = float(self.theta[layout.parts["lags"]] @ layout.lags)
-        return lag if lag >= shortest else 0.0
+        lag = float(self.theta[self.layout.parts["lags"]] @ self.layout.lags)
+        return self.lags_alone and lag < self.shortest
 
     @property
     def sufficient(self) -> bool:

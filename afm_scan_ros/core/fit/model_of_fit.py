@@ -30,14 +30,14 @@ def model_of(fit: AxisFit) -> AxisModel:
 
 
 def _vibration(fit: AxisFit) -> VibrationModel:
-    """Return the vibration of a fit; where its lag is not seen, the gain alone.
+    """Return the vibration of a fit; where its lag is hidden, the gain alone.
 
     Lags that slow samples hardly show would make most of the error of a faster scan.
     """
     found = fit.layout.dynamics(fit.theta).vibration(fit.gain)
-    if fit.seen_lag != 0.0:
+    if not fit.hidden_lag:
         return found
-    pole = 1.0 / (fit.layout.settings.unseen_lag * min(one.period for one in fit.records))
+    pole = 1.0 / (fit.layout.settings.unseen_lag * fit.shortest)
     return VibrationModel((found.static_gain * pole,), (1.0, pole))
 
 

@@ -48,7 +48,7 @@ def add(fit: AxisFit, found: FoundMode) -> None:
     """Add a mode; the first one places the lags."""
     if fit.layout.modes == 0:
         longest = max(len(one.drive) * one.period for one in fit.records)
-        shortest = min(one.period for one in fit.records)
+        shortest = fit.shortest
         settings, omega = fit.layout.settings, found.mode[0]
         laid = layout_of(fit.layout.operator, longest, shortest, settings, omega)
         now = fit.layout

@@ -138,7 +138,7 @@ class Layout:
         result[self.parts["modes"]] = np.tile([-np.inf, sharpest, -np.inf, -np.inf], self.modes)
         result[self.parts["creep"]] = 0.0
         if self.delayed:
-            result[self.parts["sensor"].stop - 1] = self.least_delay
+            result[self.delay_place] = self.least_delay
         return result
 
     @cached_property
@@ -179,7 +179,12 @@ class Layout:
 
     def delay_of(self, theta: Array) -> float:
         """Return the delay of the sensor, s."""
-        return float(theta[self.parts["sensor"].stop - 1]) if self.delayed else 0.0
+        return float(theta[self.delay_place]) if self.delayed else 0.0
+
+    @property
+    def delay_place(self) -> int:
+        """Place of the delay in θ, where there is one."""
+        return int(self.parts["sensor"].stop) - 1
 
     def with_mode(self, theta: Array, mode: Mode) -> tuple["Layout", Array]:
         """Add a mode, at the expense of the fastest lag."""

@@ -40,6 +40,11 @@ class Signals:
     recorded: Array | None = None
 
     @property
+    def given(self) -> Array:
+        """The drive before it was made late, V."""
+        return self.drive if self.recorded is None else self.recorded
+
+    @property
     def blocks(self) -> int:
         """Number of blocks, those before ``first`` included."""
         return len(self.drive) // self.block
@@ -111,21 +116,18 @@ class Signals:
 
         Until then it is what it was at the first sample. ``half_range`` is the operator's (V).
         """
-        given = self.drive if self.recorded is None else self.recorded
-        drive = np.concatenate([np.full(samples, given[0]), given])[: len(given)]
+        drive = _later(self.given, samples)
         first = self.first + samples - self.late if self.first else 0
         edges = edges_of(
             drive, self.displacement, self.noise, self.block, first, half_range, settings
         )
         moved = evolve(self, drive=drive, edges=edges, first=first)
-        return evolve(moved, late=samples, recorded=given)
+        return evolve(moved, late=samples, recorded=self.given)
 
     def without_drive_noise(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record with its drive less the noise with which that was measured."""
-        given = self.drive if self.recorded is None else self.recorded
-        quiet = without_noise(given, half_range, settings)
-        late = np.concatenate([np.full(self.late, quiet[0]), quiet])[: len(quiet)]
-        return evolve(self, drive=late, recorded=quiet)
+        quiet = without_noise(self.given, half_range, settings)
+        return evolve(self, drive=_later(quiet, self.late), recorded=quiet)
 
     def with_tones(self, tones: Iterable[float], most: int) -> "Signals":
         """Add tones (Hz), at most so many in all, but none within a bin of one that is there."""
@@ -163,6 +165,11 @@ def signals_of(
     first = first if first < settings.most_left_out * len(drive) else 0
     edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
     return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
+
+
+def _later(drive: Array, samples: int) -> Array:
+    """Return a drive (V), (n,), late by so many samples; at first it is what it began with."""
+    return np.concatenate([np.full(samples, drive[0]), drive])[: len(drive)]
 
 
 def edges_of(

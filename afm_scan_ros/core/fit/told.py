@@ -155,7 +155,7 @@ def _vibration(known: Knowledge) -> EffectStatus:
         peaks = [np.hypot(real, imag) / damping for _, damping, real, imag in modes]
         return evolve(status, intervals=_of_mode(known, int(np.argmax(peaks))))
     row = _row(fit, "lags", fit.layout.lags)
-    lag, shortest = float(row @ fit.theta), min(one.period for one in fit.records)
+    lag, shortest = float(row @ fit.theta), fit.shortest
     if not known.tells(row) or lag < shortest:  # as samples are timed no better
         return unknown("frequency")
     return evolve(status, intervals=(known.interval("lag", "s", lag, row, 0.0),))

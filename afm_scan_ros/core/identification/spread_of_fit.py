@@ -52,7 +52,7 @@ class MissedMotion:
 
 def spread_of(known: Knowledge, model: AxisModel, held_out: Sequence[HeldOut]) -> Spread:
     """Return how far the scanner may be from the model of its fit."""
-    period = min(one.period for one in known.fit.records)
+    period = known.fit.shortest
     bands = band_edges(period, resonance_of(model.vibration, period))
     spread = Spread(*known.variants(), bands, np.zeros(len(bands) - 1))
     least = known.fit.layout.settings.least_discrepancy
