@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 from attrs import fields
 
+from afm_scan_ros.core.diagnosis.settings import PartingSettings
 from afm_scan_ros.core.extension import ExtensionSettings
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.drivers.safety import SafetySettings
 
-SETTINGS: tuple[type, ...] = (SafetySettings, FitSettings, ExtensionSettings)
+SETTINGS: tuple[type, ...] = (SafetySettings, FitSettings, PartingSettings, ExtensionSettings)
 
 INTRODUCTION = """\
 # Settings

@@ -17,12 +17,11 @@ from afm_scan_ros.core.types import Array
 def bounds(edges: ArrayLike, count: int, sample_period: float) -> tuple[int, ...]:
     """First coefficients (n + 1,) of n bands between n + 1 edges (Hz), and where the last ends.
 
-    What lies outside all bands belongs to the nearest.
+    What lies on an edge, but for rounding, belongs to the band above; what lies outside all bands
+    to the nearest.
     """
     inner, duration = np.asarray(edges, dtype=np.float64)[1:-1], 2.0 * count * sample_period
-    first = np.ceil(inner * duration)
-    first -= (first - 1.0) / duration >= inner  # rounded up by one that lies on its edge
-    first += first / duration < inner
+    first = np.ceil(inner * duration * (1.0 - 1e-12))
     return (0, *(int(k) for k in np.minimum(first, count)), count)
 
 
@@ -53,12 +52,6 @@ def coefficients(signals: Array) -> Array:
     found = dct(signals, norm="ortho") / np.sqrt(signals.shape[1])
     found[:, 0] = 0.0
     return np.asarray(found)
-
-
-def band_products(one: Array, other: Array, edges: ArrayLike, sample_period: float) -> Array:
-    """Mean products (bands, m, k) of signals with coefficients (m, n) and (k, n)."""
-    bands = pairwise(bounds(edges, one.shape[1], sample_period))
-    return np.array([one[:, first:last] @ other[:, first:last].T for first, last in bands])
 
 
 def rms_by_band(signal: Array, edges: ArrayLike, sample_period: float) -> Array:

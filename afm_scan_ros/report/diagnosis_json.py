@@ -12,8 +12,9 @@ from afm_scan_ros.core.closed_loop import FIRST, Round
 from afm_scan_ros.core.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.experiments import Proposal
-from afm_scan_ros.core.diagnosis.likelihood import BandFit, known_freedom, known_variance
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.residual_report import Description, ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
 from afm_scan_ros.core.diagnosis.search import Selection
@@ -140,11 +141,8 @@ def residual_section(found: ResidualReport) -> Document:
                 "record": before.record,
                 "initial_hysteresis_state": initial_state_text(before),
                 "rms_is_of": "the whole record",
-                "floor": {
-                    **_figures(evidence.limit, LIMIT),
-                    "variance_m2": _plain(known_variance(evidence.limit)),
-                    "known_from": float(known_freedom(evidence)[0]),
-                },
+                "floor": _figures(evidence.limit, LIMIT),
+                "cells": _cells(evidence),
                 "before": _described(before),
                 "after": _described(after),
             }
@@ -156,22 +154,33 @@ def residual_section(found: ResidualReport) -> Document:
     }
 
 
+def _cells(evidence: Evidence) -> Document:
+    """Return the variance of the residual in each cell, and its degrees of freedom."""
+    variance, repetition = evidence.variance, evidence.cells.repetition
+    return {
+        "periods": repetition and repetition.periods,
+        "variance_m2": _plain(variance.total),
+        "freedom": _plain(variance.freedom),
+        "known_from": _plain(variance.known),
+    }
+
+
 def _likelihood(found: Selection) -> Document:
     """Return the log likelihood of each set's best trial, and its log probability; in nats."""
-    fits = {(): found.without, **{names: t.bands for names, t in found.posterior.best.items()}}
+    fits = {(): found.without, **{names: t.cells for names, t in found.posterior.best.items()}}
     return {
         joined(names): {**_fit(fits.get(names)), "log_probability": log}
         for names, log in found.posterior.logs.items()
     }
 
 
-def _fit(found: BandFit | None) -> Document:
+def _fit(found: CellFit | None) -> Document:
     if found is None:
-        return dict.fromkeys(("log_likelihood", "log_base", "band_rms_m"))
+        return dict.fromkeys(("log_likelihood", "log_base", "cell_rms_m"))
     return {
         "log_likelihood": found.log_likelihood,
         "log_base": found.log_base,
-        "band_rms_m": _plain(np.sqrt(found.power)),
+        "cell_rms_m": _plain(np.sqrt(found.power)),
     }
 
 

@@ -20,10 +20,11 @@ from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter, with_base
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
-from afm_scan_ros.core.diagnosis.likelihood import FREEDOM, TYPICAL_SHARE, known_variance
-from afm_scan_ros.core.diagnosis.preparation import LEAST_MOTION, evidence_of
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
+from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import ScannerModel
@@ -148,14 +149,14 @@ class AxisDiagnosis:
 
     @property
     def _adequate(self) -> bool:
-        """Whether no band lacks anything.
+        """Whether no cell lacks anything.
 
         The stated error of a formula holds inside the ranges of its parameters. At an end of a
         range the formula counts as exact.
         """
         selected, reached = self.selection.selected, self.selection.reached
         if selected and selected.at_end:
-            exact = np.concatenate([known_variance(each.limit) for each in self.evidence])
+            exact = np.concatenate([each.variance.total for each in self.evidence])
             return evolve(reached, variance=exact).adequate
         return reached.adequate
 
@@ -217,11 +218,7 @@ class AxisDiagnosis:
 
     @property
     def _still(self) -> bool:
-        return all(
-            np.ptp(e.playback.displacement(self.chain))
-            < LEAST_MOTION * np.linalg.norm(e.limit.noise)
-            for e in self.evidence
-        )
+        return all(each.still(self.chain) for each in self.evidence)
 
 
 def diagnose_axis(
@@ -247,7 +244,9 @@ def _search(
     evidence: tuple[Evidence, ...], chain: Chain, progress: ProgressCallback
 ) -> ModelSearch:
     fitter = CandidateFitter(evidence, chain)
-    return ModelSearch(fitter, lambda c: features_of(fitter.decimated_evidence, c), progress)
+    return ModelSearch(
+        fitter, lambda c: features_of(fitter.decimated_evidence, evidence, c), progress
+    )
 
 
 def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
@@ -279,22 +278,32 @@ def _time_varying(
 ) -> Iterator[int]:
     if selected is None:
         return iter(())
-    moved = [each.with_base(selected.bands.deviations) for each in evidence]
+    moved = [each.with_base(selected.cells.deviations) for each in evidence]
     return time_varying(moved, chain, selected)
 
 
-def features_of(evidence: Sequence[Evidence], chain: Chain) -> ResidualFeatures:
+def features_of(
+    evidence: Sequence[Evidence], whole: Sequence[Evidence], chain: Chain
+) -> ResidualFeatures:
     """Features of the record whose residual exceeds its detection limit most.
 
-    Its spectral lines come second to those of the longest record, which tells frequencies best:
-    a frequency that is wrong by more than one over a record's length explains nothing of it.
+    Lines that the noise of the ``whole`` records does not explain come first. The record's own come
+    second to those of the longest record, which tells frequencies best: a frequency that is wrong
+    by more than one over a record's length explains nothing of it.
     """
     loudest = max(evidence, key=lambda e: float(np.mean(e.normalised_residual(chain) ** 2)))
     view, residual = loudest.playback.view, loudest.residual(chain)
     longest = max(evidence, key=lambda e: e.playback.view.duration)
     both = dict.fromkeys((longest, loudest))
     lines = (prominent_lines(e.residual(chain), e.playback.view.sample_period) for e in both)
-    ranked = tuple(line for rank in zip_longest(*lines) for line in rank if line is not None)
+    own = (line for rank in zip_longest(*lines) for line in rank if line is not None)
+    beyond = tuple(line for each in whole for line in each.lasting_lines(chain)[: PARTING.starts])
     return ResidualFeatures(
-        view.sample_period, view.drive, view.measured, residual, view.other, ranked
+        view.sample_period,
+        view.drive,
+        view.measured,
+        residual,
+        view.other,
+        prominent=(*beyond, *own),
+        beyond_noise=bool(beyond),
     )

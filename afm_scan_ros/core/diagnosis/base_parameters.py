@@ -15,11 +15,9 @@ from functools import partial
 import numpy as np
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.bands import coefficients
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
-from afm_scan_ros.core.diagnosis.likelihood import known_freedom, known_variance, weights
 from afm_scan_ros.core.effects.parameter_shift import insert_resonance
 from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
@@ -72,10 +70,9 @@ def with_base_parameters(
 
 def _information(evidence: Evidence, influence: Array) -> Array:
     """Information (m,) of a record on each parameter over its prior's."""
-    moved = coefficients(influence)
-    power = np.diagonal(evidence.band_products(moved, moved), axis1=1, axis2=2)
-    variance, known = known_variance(evidence.limit), known_freedom(evidence)
-    return np.asarray(weights(np.zeros_like(variance), variance, known) @ power)
+    moved = evidence.cells.with_motion(influence)
+    power = np.diagonal(evidence.cells.products(moved, moved), axis1=1, axis2=2)
+    return np.asarray(evidence.variance.weights(np.zeros(len(power))) @ power)
 
 
 def _stated(chain: Chain) -> Iterator[BaseParameter]:

@@ -10,7 +10,7 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
-from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
+from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -43,17 +43,17 @@ CANDIDATES = tuple(
 
 @frozen(eq=False)
 class FittedCandidates:
-    """Candidates fitted together, and what they leave in the bands of all records."""
+    """Candidates fitted together, and what they leave in the cells of all records."""
 
     candidates: tuple[Candidate, ...]
     fit: Fit
-    bands: BandFit
+    cells: CellFit
 
     @property
     def log_posterior(self) -> float:
         """Log of prior times evidence, in nats, relative to other sets."""
         prior = sum(LOG_ODDS - np.log(len(candidate.effect.forms)) for candidate in self.candidates)
-        return float(self.bands.log_likelihood + self.fit.log_volume + prior)
+        return float(self.cells.log_likelihood + self.fit.log_volume + prior)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -205,15 +205,15 @@ class CandidateFitter:
             found = Problem(evidence, self.chain, forms, span=self.span).descend(rows)
             if found is None:
                 return None
-            bands = self.likelihood.fit(inserted(self.chain, forms, found.rows))
-            evidence, rows = self.likelihood.reweighted(bands), found.rows
-            trial = FittedCandidates(candidates, found, bands)
+            cells = self.likelihood.fit(inserted(self.chain, forms, found.rows))
+            evidence, rows = self.likelihood.reweighted(cells), found.rows
+            trial = FittedCandidates(candidates, found, cells)
         return trial
 
     def on_fitted_stretches(self, selected: FittedCandidates) -> Chain:
         """Chain with the values fitted to every other stretch; those of all where that fails."""
         forms = [candidate.form for candidate in selected.candidates]
-        evidence = self.likelihood.reweighted(selected.bands)
+        evidence = self.likelihood.reweighted(selected.cells)
         found = Problem(evidence, self.chain, forms, Evidence.on_fitted).descend(selected.fit.rows)
         return inserted(self.chain, forms, found.rows) if found else selected.extended(self.chain)
 

@@ -6,7 +6,8 @@ give the residual on the stretches between, which are held out.
 The search of starting values takes hundreds of predictions, of a decimated record. Decimation keeps
 the whole duration, and with it drift and the motion of the other axis, which an excerpt would not.
 The rate is halved while two conditions hold. The model predicts the same displacement at the
-remaining samples, and the residual at the removed frequencies is at its detection limit.
+remaining samples, and the residual at the removed frequencies is at its detection limit and has no
+lasting line.
 """
 
 from functools import cached_property
@@ -15,45 +16,85 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.bands import band_products, fast_length, rms_by_band, weighted
+from afm_scan_ros.core.bands import fast_length, rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit, MotionByBand
 from afm_scan_ros.core.diagnosis.records import Playback
+from afm_scan_ros.core.diagnosis.tones import lasting_lines
+from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM, UNTESTED_FREEDOM, CellVariance
+from afm_scan_ros.core.effects.periodic_disturbance import undisturbed
 from afm_scan_ros.core.types import Array
 
+LEAST_MOTION = 100.0
+"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
 STRETCHES = 16
 """Stretches of a record; half of them are for fitting."""
 
 
 @frozen(eq=False, slots=False)
 class Evidence:
-    """One axis of one record, its detection limit, and the weights of its coefficients (n,).
+    """One axis of one record, its detection limit, and the variance of its residual by cell.
 
     ``untested`` is the record's motion where the model's error is not known for such a motion.
     ``base`` (m, n) is the displacement (m) that one standard deviation of each free parameter of
-    the base model adds. ``fitted`` (n,) are the samples of every other stretch.
+    the base model adds. ``cells`` are those of the model's motion, and ``variance`` is that of a
+    residual in them. ``weights`` (cells,) in 1/m² are those of least squares, by default for a
+    residual as expected. ``left`` (l,) are the coefficients between the harmonics of what the model
+    leaves there. No effect of the motion is sought in them: what repeats with changes is the
+    model's error first.
+    ``fitted`` (n,) are the samples of every other stretch.
     """
 
     playback: Playback
     limit: DetectionLimit
     untested: MotionByBand | None = None
     base: Array = field()
+    cells: RecordCells = field()
+    variance: CellVariance = field()
+    weights: Array = field()
+    left: Array = field(factory=lambda: np.empty(0))
     fitted: NDArray[np.bool_] = field(init=False)
-    _weights: Array = field(init=False)
 
     @base.default
     def _held(self) -> Array:
         return np.empty((0, len(self.playback.view.measured)))
 
-    @_weights.default
-    def _of_limit(self) -> Array:
+    @cells.default
+    def _by_band(self) -> RecordCells:
         view = self.playback.view
-        return self.limit.weights(len(view.measured), view.sample_period)
+        return RecordCells(self.limit.edges, len(view.measured), view.sample_period)
+
+    @variance.default
+    def _of_limit(self) -> CellVariance:
+        return CellVariance.of_motion(self.limit, self.tested)
+
+    @weights.default
+    def _expected(self) -> Array:
+        return self.variance.expected_weights
 
     @fitted.default
     def _by_turns(self) -> NDArray[np.bool_]:
         count = len(self.playback.view.measured)
         return np.asarray(np.arange(count) * STRETCHES // count % 2 == 0)
+
+    @property
+    def tested(self) -> float:
+        """Amplitudes from which the model's error is known."""
+        return UNTESTED_FREEDOM if self.untested else KNOWN_FREEDOM
+
+    def parted(self, cells: RecordCells, chain: Chain) -> "Evidence":
+        """The same evidence by other cells, with the variance that a chain's residual tells."""
+        moved, left = self.playback.displacement(chain), self.residual(chain)
+        if self.still(chain):
+            variance = CellVariance.at_rest(self.limit, self.cells, moved, self.tested)
+            return evolve(self, variance=variance, weights=variance.expected_weights)
+        if cells.repetition is None:
+            return self
+        variance = CellVariance.repeating(self.limit, cells, moved, left, self.tested)
+        between = cells.between((left + self._disturbance(chain))[np.newaxis])[0]
+        weights = variance.expected_weights
+        return evolve(self, cells=cells, variance=variance, weights=weights, left=between)
 
     def from_depolarised(self) -> "Evidence":
         """The same evidence with a depolarised scanner at the record's start."""
@@ -70,30 +111,61 @@ class Evidence:
         playback = Playback(evolve(view, measured=measured), self.playback.initial_state)
         return evolve(self, playback=playback)
 
+    def still(self, chain: Chain) -> bool:
+        """Whether a chain moves too little for the record to show anything of it."""
+        moved = np.ptp(self.playback.displacement(chain))
+        return bool(moved <= LEAST_MOTION * np.linalg.norm(self.limit.noise))
+
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
         left = self.playback.view.measured - self.playback.displacement(chain)
         return np.asarray(left - left.mean())
 
+    def lasting_lines(self, chain: Chain) -> tuple[float, ...]:
+        """Frequencies (Hz) of lasting lines between the harmonics of a motion, or at rest."""
+        cells, residual = self.cells, self.residual(chain)
+        if of := cells.repetition:
+            between = of.signals(of.between(residual[np.newaxis]), cells.count)[0]
+            residual = between[of.first : of.last]
+        elif not self.still(chain):
+            return ()
+        return lasting_lines(residual, cells.sample_period, of)
+
     def normalised_residual(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its detection limit."""
-        return self.normalised(self.residual(chain))
+        view = self.playback.view
+        weights = self.limit.weights(len(view.measured), view.sample_period)
+        return weighted(self.residual(chain), weights)
 
-    def normalised(self, signal: Array) -> Array:
-        """Signal (n,) in m with each band in units of its detection limit."""
-        return weighted(signal, self._weights)
+    def coefficients(self, chain: Chain) -> Array:
+        """Coefficients (k,) of a chain's residual; between harmonics less disturbances alone."""
+        found = self.cells.coefficients(self.residual(chain)[np.newaxis])[0]
+        if len(self.left):
+            disturbed = self._disturbance(chain)[np.newaxis]
+            found[len(found) - len(self.left) :] = self.left - self.cells.between(disturbed)[0]
+        return np.asarray(found)
 
-    def on_fitted(self, signal: Array) -> Array:
-        """The same (m,) on the stretches that a fit for the held-out ones sees."""
-        return self.normalised(signal)[self.fitted]
+    def _disturbance(self, chain: Chain) -> Array:
+        """Displacement (n,) in m by the disturbances of a chain, whatever it does besides."""
+        chain = chain.of_record(self.playback.view.number)
+        without = undisturbed(chain)
+        if without == chain:
+            return np.zeros(len(self.playback.view.drive))
+        return self.playback.displacement(chain) - self._without.displacement(without)
 
-    def band_products(self, one: Array, other: Array) -> Array:
-        """Mean products (bands, m, k) in m² of signals with coefficients (m, n) and (k, n)."""
-        return band_products(one, other, self.limit.edges, self.playback.view.sample_period)
+    @cached_property
+    def _without(self) -> Playback:
+        """Playback of chains without disturbances, that keeps what is evaluated of them."""
+        return Playback(self.playback.view, self.playback.initial_state)
 
-    def power(self, signal: Array) -> Array:
-        """Mean square (bands,) in m² of a signal (n,) in m."""
-        return rms_by_band(signal, self.limit.edges, self.playback.view.sample_period) ** 2
+    def whitened(self, coefficients: Array) -> Array:
+        """Coefficients (k,), each times the root of its cell's weight."""
+        return np.asarray(self.cells.spread(np.sqrt(self.weights)) * coefficients)
+
+    def on_fitted(self, coefficients: Array) -> Array:
+        """The same as a signal (m,), on the stretches that a fit for the held-out ones sees."""
+        found = self.cells.signal(self.whitened(coefficients))[self.fitted]
+        return np.asarray(found / np.sqrt(len(found)))
 
     @cached_property
     def reach(self) -> float:
@@ -119,11 +191,11 @@ def decimated(evidence: Evidence, chain: Chain) -> Evidence:
     """Evidence at the lowest rate that determines a chain as well; short records unchanged."""
     if len(evidence.playback.view.drive) <= LONG_RECORD:
         return evidence
-    fewer = _every_other(evidence)
+    fewer = _every_other(evidence, chain)
     return decimated(fewer, chain) if _same(evidence, fewer, chain) else evidence
 
 
-def _every_other(evidence: Evidence) -> Evidence:
+def _every_other(evidence: Evidence, chain: Chain) -> Evidence:
     """Evidence of every other sample, with the drive averaged over pairs of samples."""
     view = evidence.playback.view
     count = fast_length(len(view.drive) // 2)
@@ -133,7 +205,9 @@ def _every_other(evidence: Evidence) -> Evidence:
     fewer = evolve(view, sample_period=period, drive=drive, measured=measured, other=other)
     playback = Playback(fewer, evidence.playback.initial_state)
     base = evidence.base[:, : 2 * count : 2]
-    return Evidence(playback, evidence.limit.sampled(period), base=base)
+    limit, of = evidence.limit.sampled(period), evidence.cells.repetition
+    cells = RecordCells(limit.edges, count, period, of and of.halved(count))
+    return Evidence(playback, limit, evidence.untested, base).parted(cells, chain)
 
 
 def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:
@@ -142,5 +216,10 @@ def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:
     moved = predicted - sampled[: 2 * len(predicted) : 2]
     limit = fewer.limit
     differs = rms_by_band(moved, limit.edges, fewer.playback.view.sample_period) / limit.rms
-    unseen = np.array(evidence.limit.edges[1:]) > limit.edges[-1]
-    return bool(differs.max() < EQUAL_WITHIN and evidence.ratio(chain)[unseen].max() < AT_LIMIT)
+    unseen, lines = (
+        np.array(evidence.limit.edges[1:]) > limit.edges[-1],
+        evidence.lasting_lines(chain),
+    )
+    below = max(lines, default=0.0) < limit.edges[-1]
+    quiet = bool(evidence.ratio(chain)[unseen].max() < AT_LIMIT)
+    return bool(differs.max() < EQUAL_WITHIN) and quiet and below

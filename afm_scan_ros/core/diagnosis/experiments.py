@@ -21,16 +21,10 @@ from operator import attrgetter
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.bands import coefficients
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.likelihood import (
-    FORMULA_ERRORS,
-    FREEDOM,
-    known_freedom,
-    known_variance,
-)
+from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.search import OUTSIDE
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -81,22 +75,23 @@ class SizedExperiment:
                 yield other
 
 
-def distance(products: Array, split: int, variance: Array, known: Array) -> float:
+def distance(products: Array, split: int, variance: Array, known: Array, freedom: Array) -> float:
     """Bhattacharyya distance of two hypotheses.
 
-    ``products`` (bands, m, m) in m² are of their difference, of the first one's deviations, up to
-    ``split``, and of the other's; each is one standard deviation. ``variance`` (bands,) in m² is of
-    noise and discrepancy, ``known`` (bands,) its degrees of freedom: exp(-B) of what no parameter
-    absorbs is averaged over the true variances, as in Student's t distribution.
+    ``products`` (cells, m, m) in m² are of their difference, of the first one's deviations, up to
+    ``split``, and of the other's; each is one standard deviation. ``variance`` (cells,) in m² is of
+    noise and discrepancy, of ``freedom`` (cells,) amplitudes, and ``known`` (cells,) as from so
+    many: exp(-B) of what no parameter absorbs is averaged over the true variances, as in Student's
+    t distribution.
     """
     scale = np.sqrt([1.0, *[0.5] * (products.shape[1] - 1)])
     products = products * np.outer(scale, scale)
-    whole = FREEDOM * np.tensordot(1.0 / variance, products, 1)
+    whole = np.tensordot(freedom / variance, products, 1)
     gram = whole[1:, 1:]
     absorbed = np.linalg.solve(np.eye(len(gram)) + gram, whole[1:, 0])
     left = np.append(1.0, -absorbed)
     power = np.maximum(np.einsum("i,bij,j->b", left, products, left), 0.0)
-    apart = 0.5 * known * np.log1p(0.25 * FREEDOM * power / (known * variance))
+    apart = 0.5 * known * np.log1p(0.25 * freedom * power / (known * variance))
     alone = (2.0 * whole[part, part] for part in (slice(1, split), slice(split, None)))
     spread = 0.5 * (_log_volume(gram) - 0.5 * sum(map(_log_volume, alone)))
     return float(np.sum(apart)) + float(absorbed @ absorbed) / 8.0 + max(spread, 0.0)
@@ -107,13 +102,19 @@ def _log_volume(gram: Array) -> float:
 
 
 def information(
-    products: Array, counts: Sequence[int], variances: Array, known: Array, logs: Sequence[float]
+    products: Array,
+    counts: Sequence[int],
+    variances: Array,
+    known: Array,
+    freedom: Array,
+    logs: Sequence[float],
 ) -> tuple[float, float]:
     """Bits, and the probability of the truth, that are expected at least of n hypotheses.
 
-    ``products`` (bands, m, m) in m² are of their n predictions, then of their deviations, of which
-    each has one of ``counts`` (n,). ``variances`` (n, bands) in m² are of noise and discrepancy,
-    ``known`` (bands,) their degrees of freedom, and ``logs`` (n,) the logs of the probabilities.
+    ``products`` (cells, m, m) in m² are of their n predictions, then of their deviations, of which
+    each has one of ``counts`` (n,). ``variances`` (n, cells) in m² are of noise and discrepancy,
+    ``known`` and ``freedom`` (cells,) as in ``distance``, and ``logs`` (n,) the logs of the
+    probabilities.
     """
     prior = np.exp(np.asarray(logs) - np.logaddexp.reduce(logs))
     pick, ends = np.eye(products.shape[1]), np.cumsum([len(prior), *counts])
@@ -122,7 +123,7 @@ def information(
     for i, j in combinations(range(len(prior)), 2):
         rows = np.vstack((pick[i] - pick[j], own[i], own[j]))
         variance = 0.5 * (variances[i] + variances[j])
-        apart = distance(rows @ products @ rows.T, 1 + len(own[i]), variance, known)
+        apart = distance(rows @ products @ rows.T, 1 + len(own[i]), variance, known, freedom)
         overlap[i, j] = overlap[j, i] = np.exp(-apart)
     wrong = 0.5 * (np.sqrt(prior) @ overlap @ np.sqrt(prior) - 1.0)
     return max(0.0, -float(prior @ np.log2(overlap @ prior))), max(1.0 - float(wrong), 0.0)
@@ -241,19 +242,20 @@ def assess(
 
 def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tuple[float, float]:
     """Bits and probability that are expected of a record that hypotheses predict."""
-    played = seen.playback.displacement
-    plain, moved = played(base), [played(each.chain) for each in credible]
+    played, plain = seen.playback.displacement, seen.playback.displacement(base)
+    moved = [played(each.chain) - plain for each in credible]
     changed = [
-        (played(near) - own) / SHARE
+        (played(near) - plain - own) / SHARE
         for own, each in zip(moved, credible, strict=True)
         for near in each.deviated
     ]
-    known, formula = known_variance(seen.limit), max(FORMULA_ERRORS) ** 2
-    all_moved = coefficients(np.array(moved + changed))
+    of, formula = seen.variance, max(FORMULA_ERRORS) ** 2
+    all_moved = seen.cells.with_motion(np.array(moved + changed))
     return information(
-        seen.band_products(all_moved, all_moved),
+        seen.cells.products(all_moved, all_moved),
         [len(each.deviated) for each in credible],
-        np.array([known + formula * seen.power(own - plain) for own in moved]),
-        known_freedom(seen),
+        np.array([of.total + formula * seen.cells.power(own) for own in all_moved[: len(moved)]]),
+        of.known,
+        of.freedom,
         [each.log for each in credible],
     )

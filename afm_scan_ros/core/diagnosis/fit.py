@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.likelihood import FREEDOM
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
@@ -54,13 +53,13 @@ class Fit:
 class BaseRidge:
     """Integrates over parameters of the base model whose prior is normal.
 
-    ``influences`` (n,) are those of one standard deviation of each on a normalised residual (n,).
+    ``influences`` (n,) are those of one standard deviation of each on a weighted residual (n,).
     With A its transpose the residual has the covariance I + A Aᵀ. Its inverse square root is
     I - A V diag(1 / (q (1 + q))) Vᵀ Aᵀ, where V diag(q² - 1) Vᵀ is the influence's Gram matrix.
     """
 
     def __init__(self, influences: Sequence[Array]) -> None:
-        self._influence = FREEDOM**0.5 * np.atleast_2d(influences)
+        self._influence = np.atleast_2d(influences)
         values, axes = np.linalg.eigh(self._influence @ self._influence.T)
         root = np.sqrt(1.0 + np.maximum(values, 0.0))
         self._inner = (axes / (root * (1.0 + root))) @ axes.T
@@ -74,7 +73,7 @@ class BaseRidge:
 
 
 class Problem:
-    """Forms to be fitted together: the normalised residual ``seen`` of their parameters.
+    """Forms to be fitted together: the weighted residual ``seen`` of their parameters.
 
     Values have shape (r, p): one row per record, the forms' parameters one after the other.
     """
@@ -84,16 +83,17 @@ class Problem:
         evidence: Sequence[Evidence],
         chain: Chain,
         forms: Sequence[EffectForm],
-        seen: Callable[[Evidence, Array], Array] = Evidence.normalised,
+        seen: Callable[[Evidence, Array], Array] = Evidence.whitened,
         span: float = 1.0,
     ) -> None:
         self._evidence, self._chain, self._forms, self._seen = evidence, chain, forms, seen
         reach = max(each.reach for each in evidence)
-        self._layout, self._span = ParameterLayout(forms, len(evidence), reach), span
+        longest = max(len(each.playback.view.drive) for each in evidence)
+        self._layout, self._span = ParameterLayout(forms, len(evidence), reach, longest), span
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._spans = self._layout.each("spans_decades") > 0.0
         self._last: tuple[Array, Array] | None = None
-        base = zip(*(each.base for each in evidence), strict=True)
+        base = zip(*(each.cells.with_motion(each.base) for each in evidence), strict=True)
         self._base = BaseRidge([self._joined(signals) for signals in base])
 
     def begin(
@@ -136,11 +136,11 @@ class Problem:
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None
-        halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)) / FREEDOM)
+        halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)))
         rows = self._layout.rows
         widths = self._layout.prior_widths(found.x, self._span)
         scaled = found.jac * widths
-        inner = np.eye(len(widths)) + FREEDOM * scaled.T @ scaled  # by Laplace's method
+        inner = np.eye(len(widths)) + scaled.T @ scaled  # by Laplace's method
         volume = float(-0.5 * np.linalg.slogdet(inner)[1])
         deviations = self._layout.of_further_record(widths, inner)
         return Fit(rows(found.x), rows(halves)[0], volume, deviations)
@@ -176,21 +176,20 @@ class Problem:
         return best
 
     def _excess(self, values: Array) -> Array:
-        """Normalised residuals of all records, each record with the same total weight.
+        """Weighted residuals of all records.
 
         The last result is cached, since differences are taken at the values of the last step.
         """
         if self._last and np.array_equal(values, self._last[0]):
             return self._last[1]
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
-        joined = self._joined([each.residual(chain) for each in self._evidence])
+        joined = self._joined([each.coefficients(chain) for each in self._evidence])
         self._last = values.copy(), self._base.left(joined)
         return self._last[1]
 
-    def _joined(self, signals: Iterable[Array]) -> Array:
-        """Normalised signals of all records, one after the other."""
-        parts = map(self._seen, self._evidence, signals)
-        return np.concatenate([part / np.sqrt(len(part)) for part in parts])
+    def _joined(self, coefficients: Iterable[Array]) -> Array:
+        """Weighted coefficients of all records, one after the other."""
+        return np.concatenate(list(map(self._seen, self._evidence, coefficients)))
 
     def _jacobian(self, values: Array, known: Mapping[int, Array], widths: Array | None) -> Array:
         here = self._excess(values)
@@ -245,7 +244,14 @@ def _amplitudes(form: EffectForm) -> list[bool]:
 class ParameterLayout:
     """Maps values (r, p) of p parameters in r records to the free numbers (f,) of a fit."""
 
-    def __init__(self, forms: Sequence[EffectForm], records: int, reach: float = math.inf) -> None:
+    def __init__(
+        self,
+        forms: Sequence[EffectForm],
+        records: int,
+        reach: float = math.inf,
+        samples: int = 2,
+    ) -> None:
+        self._samples = samples
         self.parameters = [_within(p, reach) for form in forms for p in form.parameters]
         own = np.array([p.own for p in self.parameters])
         self._amplitudes = np.array([a for form in forms for a in _amplitudes(form)], dtype=float)
@@ -263,8 +269,8 @@ class ParameterLayout:
         """Widths (f,) of the prior of free numbers about their values.
 
         Priors are uniform in the logarithm, Jeffreys' for a scale: of an amount over ``span`` on
-        either side of none that its range allows, of other numbers over their range. A number that
-        is ``located`` has no width: the residual's lines give it.
+        either side of none that its range allows, of other numbers over their range. That of the
+        frequency of a spectral line is what a record of so many samples shows.
         """
         neutral, lower, upper = (self.each(name) for name in ("neutral", "lower", "upper"))
         away = np.abs(values - neutral)
@@ -272,8 +278,8 @@ class ParameterLayout:
         amplitude, sides = self.each_amplitude(), 1.0 + ((lower < neutral) & (neutral < upper))
         with np.errstate(divide="ignore", invalid="ignore"):
             ranges = np.log(np.where(amplitude, 2.0, upper / lower))
-        spans = np.where(self.each("located") > 0.0, 0.0, ranges)
-        widths = np.where(amplitude, sides * span * amount, spans * values)
+        ranges = np.where(self.each("located") > 0.0, np.log(0.5 * self._samples), ranges)
+        widths = np.where(amplitude, sides * span * amount, ranges * values)
         return np.asarray(widths / np.sqrt(2.0 * np.pi))
 
     def of_parameters(self, part: slice) -> NDArray[np.bool_]:

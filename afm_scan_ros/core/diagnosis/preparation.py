@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 from afm_scan_ros.core.bands import fast_length, rms_by_band
 from afm_scan_ros.core.chain import Chain
+from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import (
     DetectionLimit,
     MotionByBand,
@@ -20,7 +21,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
     error_between_levels,
     untested_motion,
 )
-from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.evidence import LEAST_MOTION, Evidence
 from afm_scan_ros.core.diagnosis.records import (
     DEPOLARISED,
     AxisSignals,
@@ -33,6 +34,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array
 
 WITHIN_NOISE = 2.0
@@ -108,10 +110,6 @@ def _refined_state(
     return initial_state(found.x)
 
 
-LEAST_MOTION = 100.0
-"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
-
-
 def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 0) -> Evidence:
     """Evidence of one axis of a record, from its estimated initial hysteresis state.
 
@@ -125,10 +123,19 @@ def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 
     playback = _playback(chain, view, known, observed)
     limit = _detection_limit(playback, chain, known)
     untested = _untested(playback, chain, known, limit)
-    if observed.scan:
-        return Evidence(playback, limit, untested)
-    duration = len(view.measured) * view.sample_period
-    return Evidence(playback, limit.unprepared(duration), untested)
+    if not observed.scan:
+        limit = limit.unprepared(len(view.measured) * view.sample_period)
+    cells = RecordCells(limit.edges, len(view.drive), view.sample_period)
+    cells = cells.repeating(view.drive, view.rates, _lines(observed))
+    return Evidence(playback, limit, untested).parted(cells, chain)
+
+
+def _lines(observed: Record) -> tuple[int, int] | None:
+    """Samples from a scan's first line to before the end of its last; None of no scan."""
+    if observed.scan is None:
+        return None
+    lines, count = phases(observed.scan).lines, fast_length(len(observed.drive))
+    return min(lines.start, count), min(lines.stop, count)
 
 
 def _other(axis: str, model: ScannerModel, observed: Record) -> Array:

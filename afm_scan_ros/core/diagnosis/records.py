@@ -73,11 +73,11 @@ class InitialState:
         return np.asarray(np.interp(progress, np.arange(len(stops)), stops))
 
     def played(self, cascade: Cascade, drive: Array) -> Array:
-        """Output (n,) of the elements up to the hysteresis, from this state on."""
-        if self.blank:
-            return cascade.apply(cascade.at_rest(), drive)[1]
-        state, before = cascade.apply(cascade.at_rest(), self.path())
-        return np.asarray(cascade.apply(state, drive)[1] - before[-1])
+        """Output (n,) of the elements up to the hysteresis from this state on, less that before."""
+        state, path = cascade.at_rest(), np.zeros(1) if self.blank else self.path()
+        settled, before = cascade.apply(state, path)
+        begun = state if self.blank else settled
+        return np.asarray(cascade.apply(begun, drive)[1] - before[-1])
 
 
 DEPOLARISED = InitialState()
@@ -105,9 +105,13 @@ class Playback:
         for number, stage in enumerate(chain.stages()):
             changed = changed or number not in self._cache or self._cache[number][0] != stage
             if changed:
-                begun = self.initial_state if number == 0 else DEPOLARISED
-                met = self._with_other(signal, stage)
-                self._cache[number] = stage, begun.played(stage.at(period), met)
+                met, cascade = self._with_other(signal, stage), stage.at(period)
+                played = (
+                    cascade.apply(cascade.at_rest(), met)[1]
+                    if number
+                    else self.initial_state.played(cascade, met)
+                )
+                self._cache[number] = stage, played
             signal = self._cache[number][1]
         return signal
 

@@ -163,14 +163,14 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
     for names in [n for n in posterior.probability if n != own][:RUNNERS_UP]:
         why = WhyNot.CREDIBLE if names in credible else WhyNot.LESS_PROBABLE
         best = posterior.best.get(names)
-        bands = best.bands if best else selection.without
+        cells = best.cells if best else selection.without
         yield Alternative(
             name=joined(names),
             kind=best.candidates[0].form.kind if best and len(names) == 1 else "",
             axis=diagnosed.axis,
             score=posterior.log_odds(names, own),
             probability=posterior.probability[names],
-            why_not=why if bands.adequate else WhyNot.INADEQUATE,
+            why_not=why if cells.adequate else WhyNot.INADEQUATE,
             selected=own,
         )
 

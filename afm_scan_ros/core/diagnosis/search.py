@@ -17,7 +17,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
     CandidateFitter,
     FittedCandidates,
 )
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import ProgressCallback
 
@@ -44,7 +44,7 @@ class Posterior:
 
     @classmethod
     def of(
-        cls, without: BandFit, trials: Iterable[FittedCandidates], outside: float = -np.inf
+        cls, without: CellFit, trials: Iterable[FittedCandidates], outside: float = -np.inf
     ) -> "Posterior":
         """Posterior over the model ``without`` an effect and the sets of some trials.
 
@@ -81,7 +81,7 @@ class Posterior:
         if first not in self.best:
             return first
         near = (n for n, log in self.logs.items() if log > self.logs[first] + np.log(NEARLY))
-        return next((n for n in near if n in self.best and self.best[n].bands.adequate), first)
+        return next((n for n in near if n in self.best and self.best[n].cells.adequate), first)
 
     def of_effect(self, name: str) -> float:
         """Probability that a scanner has an effect."""
@@ -137,7 +137,7 @@ FITTED = 6
 class Selection:
     """Trials of one axis, ``without`` an effect, and their posterior."""
 
-    without: BandFit
+    without: CellFit
     trials: tuple[FittedCandidates, ...]
     posterior: Posterior
 
@@ -147,9 +147,9 @@ class Selection:
         return self.posterior.best.get(self.posterior.likeliest)
 
     @property
-    def reached(self) -> BandFit:
+    def reached(self) -> CellFit:
         """Fit of the likeliest set."""
-        return self.selected.bands if self.selected else self.without
+        return self.selected.cells if self.selected else self.without
 
 
 class ModelSearch:
@@ -198,13 +198,16 @@ class ModelSearch:
         best = posterior.best.get(named)
         if self._size and (best is None or len(best.candidates) < self._size):
             return False
-        return not (best.bands if best else self._without).unremarkable
+        if not (best.cells if best else self._without).unremarkable:
+            return True
+        chain = self.fitter.chain
+        return self._features(best.extended(chain) if best else chain).beyond_noise
 
     def _parents(self) -> Iterator[FittedCandidates]:
         """Yield the sets to extend: those near the best, more where the best lacks something."""
         best, *others = _best(self._found, BEAM)
         yield best
-        lacking = self._size == 1 and not best.bands.adequate
+        lacking = self._size == 1 and not best.cells.adequate
         for other in others:
             if lacking or other.log_posterior > best.log_posterior + np.log(NEARLY):
                 yield other

@@ -80,7 +80,7 @@ class EffectParameter:
     parameter of which that is 0 is an amplitude. ``step`` is the change by which its influence is
     measured. One that is the record's ``own``, as a disturbance's phase, differs between records.
     An ``excited`` one is a frequency (Hz) that shows only where the drive moves the scanner. A
-    ``located`` one is a spectral line of the residual that stands out, so no range is searched.
+    ``located`` one is a spectral line of the residual, anywhere that a record shows one.
     """
 
     name: str

@@ -34,7 +34,8 @@ class ResidualFeatures:
 
     ``drive`` (V), measured ``displacement`` and ``residual`` (m) have shape (n,), as has ``other``,
     the other axis' displacement (m). ``sample_period`` is in s. ``prominent`` are the frequencies
-    (Hz) of the residual's largest spectral lines, see ``prominent_lines``.
+    (Hz) of the residual's largest spectral lines, see ``prominent_lines``. Noise does not explain
+    the first of them where one is ``beyond_noise``.
     """
 
     sample_period: float
@@ -43,6 +44,7 @@ class ResidualFeatures:
     residual: Array
     other: Array
     prominent: tuple[float, ...]
+    beyond_noise: bool = False
 
     def at(self, scale: Scale) -> "ResidualFeatures":
         """Return the same features in the units of the reference scanner."""
@@ -53,6 +55,7 @@ class ResidualFeatures:
             self.residual / scale.length,
             self.other / scale.length,
             tuple(line * scale.time for line in self.prominent),
+            self.beyond_noise,
         )
 
     @property

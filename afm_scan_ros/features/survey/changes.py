@@ -30,7 +30,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, FOUND
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
-from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
+from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.survey.recording import QuantityEstimate, Recording
 

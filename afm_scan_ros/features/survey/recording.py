@@ -6,28 +6,22 @@ of creep. Each prior is normal with the catalogue's bounds at two standard devia
 fitted together by Gauss and Newton's method, under the likelihood of the diagnosis
 (diagnosis/likelihood.py), as if no other effect were there.
 
-With the weights w of the bands and the Gram matrices G of the influences, the covariance is
-A = (I + sum w G)^-1. The sensor's noise of variance n in a band of N coefficients adds
+With the weights w of the cells and the Gram matrices G of the influences, the covariance is
+A = (I + sum w G)^-1. The sensor's noise of variance n in a cell of N coefficients adds
 A (sum w^2 n G / N) A of it. The rest is that of the model's error.
 """
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.bands import bounds, coefficients
+from afm_scan_ros.core.bands import bounds, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import CONFIDENT
-from afm_scan_ros.core.diagnosis.likelihood import (
-    LinearResidual,
-    known_freedom,
-    known_variance,
-    weights,
-)
+from afm_scan_ros.core.diagnosis.likelihood import LinearResidual
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.parameter_shift import (
     CREEP,
@@ -212,16 +206,14 @@ def _step(
     ]
     view = evidence.playback.view
     left = view.measured - _played(evidence, chain, unknowns, here) + here @ np.array(moved)
-    rows = coefficients(np.vstack((left, moved)))
-    products = evidence.band_products(rows, rows)
+    rows = evidence.cells.with_motion(np.vstack((left, moved)))
+    products = evidence.cells.products(rows, rows)
     linear = LinearResidual(products[:, 0, 0], products[:, 1:, 0], products[:, 1:, 1:])
-    variance, known = known_variance(evidence.limit), known_freedom(evidence)
-    weigh = partial(weights, variance=variance, known=known)
-    there = linear.profiled(weigh)
-    weight = weigh(there.power)
+    there = linear.profiled(evidence.variance.weights)
+    weight = evidence.variance.weights(there.power)
     inner = np.eye(len(here)) + np.tensordot(weight, linear.gram, 1)
     covariance = np.asarray(np.linalg.inv(inner), dtype=np.float64)
-    noise = weight**2 * evidence.limit.noise**2 / _counts(evidence)
+    noise = weight**2 * evidence.variance.noise / evidence.cells.counts
     return (
         there.deviations,
         covariance,
@@ -248,7 +240,8 @@ def _residual(evidence: Evidence, chain: Chain) -> Iterator[QuantityEstimate]:
 
     A band of mean square s2 and noise n has a variance of 2 n^2 / N + 4 n (s2 - n) / N by noise.
     """
-    power = evidence.power(evidence.residual(chain))
+    period = evidence.playback.view.sample_period
+    power = rms_by_band(evidence.residual(chain), evidence.limit.edges, period) ** 2
     limit, noise = evidence.limit.rms**2, evidence.limit.noise**2
     variance = noise * (2.0 * noise + 4.0 * np.maximum(power - noise, 0.0)) / _counts(evidence)
     mean = float(np.mean(power / limit))

@@ -51,7 +51,15 @@ LONG = {
         "random_levels",
         "scanners",
     ),
-    "diagnosis": ("mechanisms", "closed_loop", "external", "healthy_bands", "laplace", "rivals"),
+    "diagnosis": (
+        "mechanisms",
+        "closed_loop",
+        "external",
+        "healthy_bands",
+        "laplace",
+        "rivals",
+        "tones",
+    ),
     "any_lab": ("any_lab", "joint_fit"),
     "images": ("grating",),
     "learning": (

@@ -93,7 +93,7 @@ def _rows(seed: int) -> Iterator[Row]:
     truth, times, fitter = _drawn(seed)
     for forms in SETS[seed]:
         trial = _fitted(fitter, forms)
-        by_laplace = trial.bands.log_likelihood + trial.fit.log_volume
+        by_laplace = trial.cells.log_likelihood + trial.fit.log_volume
         prior = prior_of(fitter, trial)
         found = nested(_likelihood(fitter, trial, prior), prior.at, len(prior.unknown))
         yield {
@@ -106,7 +106,7 @@ def _rows(seed: int) -> Iterator[Row]:
             "nested": found.evidence,
             "error": found.error,
             "difference": by_laplace - found.evidence,
-            "missed": found.highest - trial.bands.log_likelihood,
+            "missed": found.highest - trial.cells.log_likelihood,
         }
 
 
@@ -129,7 +129,7 @@ def _fitted(fitter: CandidateFitter, forms: tuple[Form, ...]) -> FittedCandidate
     for name, kind in forms:
         chain = trial.extended(fitter.chain) if trial else fitter.chain
         effect = effect_type(name)
-        features = features_of(fitter.decimated_evidence, chain)
+        features = features_of(fitter.decimated_evidence, fitter.evidence, chain)
         begun = fitter.begin(trial, Candidate(effect, effect.form(kind)), features)
         trial = fitter.fit(begun) if begun else None
     if trial is None:

@@ -16,17 +16,9 @@ from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
-from afm_scan_ros.core.diagnosis.likelihood import (
-    FREEDOM,
-    Likelihood,
-    LinearResidual,
-    Outside,
-    known_freedom,
-    known_variance,
-    log_density,
-    weights,
-)
+from afm_scan_ros.core.diagnosis.likelihood import Likelihood, LinearResidual, Outside
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.variance import FREEDOM, log_density, weights
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
@@ -39,9 +31,10 @@ from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-BANDS, KNOWN = 12, np.full(12, 8.0)
+BANDS, KNOWN, FEW = 12, np.full(12, 8.0), np.full(12, FREEDOM)
 SEEDS = st.integers(0, 2**32 - 1)
 SIZED = st.floats(0.1, 30.0)
+SETTLED = 20_000
 
 
 def known(axis: AxisModel, width: float) -> AxisModel:
@@ -57,8 +50,10 @@ def known(axis: AxisModel, width: float) -> AxisModel:
 
 
 def answer(chain: Chain, drive: Array) -> Array:
+    """Displacement (n,) of a scanner that has settled at 0 V."""
     cascade = chain.forward(SPEC.sample_period)
-    return cascade.apply(cascade.at_rest(), drive)[1]
+    moved = cascade.apply(cascade.at_rest(), np.concatenate((np.zeros(SETTLED), drive)))[1]
+    return moved[SETTLED:]
 
 
 @cache
@@ -119,8 +114,9 @@ def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_informati
         return [each.name for each in found], with_base
 
     _, wide = free(1.0)
-    variance, freedom = known_variance(seen.limit), known_freedom(seen)
-    told = float(weights(0.0 * variance, variance, freedom) @ seen.power(wide.base[0]))
+    of = seen.variance
+    moved = seen.cells.power(seen.cells.with_motion(wide.base[:1])[0])
+    told = float(of.weights(0.0 * of.total) @ moved)
     assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
     assert "gain_1" in free((0.011 / told) ** 0.5)[0]
 
@@ -182,9 +178,12 @@ def residual(seed: int, size: float, parameters: int = 2) -> LinearResidual:
 def test_the_profile_is_the_best_nearby(seed: int, size: float) -> None:
     """Of the t likelihood, and of something outside: no other deviation is likelier."""
     linear, one = residual(seed, size), np.ones(BANDS)
-    outside = Outside(one, np.geomspace(2.0, 1e4, 64)[:, np.newaxis] * one, KNOWN)
+    outside = Outside(one, np.geomspace(2.0, 1e4, 64)[:, np.newaxis] * one, KNOWN, FEW)
     cases = (
-        (partial(weights, variance=one, known=KNOWN), lambda p: log_density(p, one, KNOWN).sum()),
+        (
+            partial(weights, variance=one, known=KNOWN, freedom=FEW),
+            lambda p: log_density(p, one, KNOWN, FEW).sum(),
+        ),
         (outside.weights, outside.log_evidence),
     )
     for weight, log in cases:
@@ -202,11 +201,11 @@ def test_the_profile_is_the_best_nearby(seed: int, size: float) -> None:
 def test_the_volume_is_laplace_s(seed: int, size: float) -> None:
     """Against quadrature over one deviation."""
     linear, one = residual(seed, size, 1), np.ones(BANDS)
-    found = linear.profiled(partial(weights, variance=one, known=KNOWN))
+    found = linear.profiled(partial(weights, variance=one, known=KNOWN, freedom=FEW))
 
     def log(deviation: float) -> float:
         at = linear.at(np.array([deviation]))
-        return float(log_density(at, one, KNOWN).sum() - 0.5 * deviation**2)
+        return float(log_density(at, one, KNOWN, FEW).sum() - 0.5 * deviation**2)
 
     (centre,), top = found.deviations, log(float(found.deviations[0]))
     whole = quad(lambda d: np.exp(log(d) - top), centre - 9.0, centre + 9.0, limit=200)[0]
@@ -219,14 +218,14 @@ def test_the_ridge_integrates_over_the_parameters(seed: int) -> None:
     """The cost is the least over them, and the volume that of all parameters together."""
     rng = np.random.default_rng(seed)
     left, base, slopes = rng.normal(size=50), rng.normal(size=(3, 50)), rng.normal(size=(50, 2))
-    ridge, scaled = BaseRidge(list(base)), FREEDOM**0.5 * base
+    ridge, scaled = BaseRidge(list(base)), base
     rows = np.vstack((scaled.T, np.eye(3)))
-    missed = np.append(FREEDOM**0.5 * left, np.zeros(3))
+    missed = np.append(left, np.zeros(3))
     least = missed - rows @ np.linalg.lstsq(rows, missed, rcond=None)[0]
-    assert FREEDOM * np.sum(ridge.left(left) ** 2) == pytest.approx(np.sum(least**2))
+    assert np.sum(ridge.left(left) ** 2) == pytest.approx(np.sum(least**2))
     seen = np.column_stack([ridge.left(each) for each in slopes.T])
     apart = np.eye(3) + scaled @ scaled.T
-    alone = np.linalg.slogdet(np.eye(2) + FREEDOM * seen.T @ seen)[1]
-    both = np.hstack((FREEDOM**0.5 * slopes, scaled.T))
+    alone = np.linalg.slogdet(np.eye(2) + seen.T @ seen)[1]
+    both = np.hstack((slopes, scaled.T))
     whole = np.linalg.slogdet(np.eye(5) + both.T @ both)[1]
     assert alone + np.linalg.slogdet(apart)[1] == pytest.approx(whole)

@@ -12,8 +12,6 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.diagnosis_json import Document, account_document
 from helpers.in_process import ALL, default_model, scan
 
-NU = 1.4
-
 
 @pytest.fixture(scope="module")
 def document() -> Document:
@@ -27,13 +25,14 @@ def document() -> Document:
     return account_document(report_residual(diagnose(ScannerModel(known), [record])))
 
 
-def test_the_log_likelihood_is_that_of_the_bands(document: Document) -> None:
+def test_the_log_likelihood_is_that_of_the_cells(document: Document) -> None:
     (record,) = document["residual"]["x"]
-    variance, known = np.array(record["floor"]["variance_m2"]), record["floor"]["known_from"]
+    cells = record["cells"]
+    variance, nu, known = (np.array(cells[k]) for k in ("variance_m2", "freedom", "known_from"))
     none = document["likelihood"]["x"]["none"]
-    ratio = np.array(none["band_rms_m"]) ** 2 / variance
-    by_hand = none["log_base"] - (NU + known) / 2.0 * np.log1p(NU * ratio / known).sum()
-    assert none["log_likelihood"] == pytest.approx(by_hand, abs=1e-2)
+    ratio = np.array(none["cell_rms_m"]) ** 2 / variance
+    by_hand = none["log_base"] - ((nu + known) / 2.0 * np.log1p(nu * ratio / known)).sum()
+    assert none["log_likelihood"] == pytest.approx(by_hand, rel=1e-4)
 
 
 def test_a_base_parameter_costs_its_prior_and_its_volume(document: Document) -> None:

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 PAGE = Path(__file__).parents[3] / "docs/reference/diagnosis_constants.md"
-WHOLE = ("axis_diagnosis", "discrepancy", "likelihood", "preparation", "search")
+WHOLE = (
+    "axis_diagnosis",
+    "discrepancy",
+    "evidence",
+    "likelihood",
+    "preparation",
+    "repetition",
+    "search",
+    "variance",
+)
 """Modules that decide, and whose numbers are all on the page but those that only set precision."""
 PRECISION = {"likelihood.SIZES", "discrepancy.SMALLEST", "discrepancy.FINER"}
 ELSEWHERE = {"model": "core", "effect_type": "core.effects"}

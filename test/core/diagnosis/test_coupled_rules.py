@@ -17,7 +17,7 @@ from afm_scan_ros.core.diagnosis.coupled.search import (
     SetPosterior,
     _extended,
 )
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import Names
 from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
@@ -34,7 +34,7 @@ RNG = np.random.default_rng(3)
 def trial(names: Names, nats: float, *, adequate: bool = True) -> FittedSet:
     """Trial of so many nats, prior odds included."""
     one = np.ones(1)
-    bands = BandFit(one, one, one, nats - LOG_ODDS * len(names))
+    bands = CellFit(one, one, one, one, nats - LOG_ODDS * len(names))
     return FittedSet(names, one, bands, adequate)
 
 
@@ -84,11 +84,11 @@ class MadeUp:
     def base(self) -> Array:
         return np.zeros(1)
 
-    def fit(self, simulated: Array, *, exact: bool = False) -> BandFit:  # noqa: ARG002
+    def fit(self, simulated: Array, *, exact: bool = False) -> CellFit:  # noqa: ARG002
         one = np.ones(1)
-        return BandFit(10.0 * one, one, 8.0 * one, -50.0)
+        return CellFit(10.0 * one, one, 8.0 * one, 1.4 * one, -50.0)
 
-    def explains(self, bands: BandFit) -> bool:
+    def explains(self, bands: CellFit) -> bool:
         return bands.unremarkable
 
     def outside(self) -> float:
@@ -103,7 +103,9 @@ def test_pairs_are_tried_only_beside_a_set_that_leaves_something(left: float, pa
     def made(names: Names) -> FittedSet:
         tried.append(names)
         nats = 50.0 if names == SOFT else 0.0
-        return FittedSet(names, one, BandFit(left * one, one, 8.0 * one, nats), left == 1.0)
+        return FittedSet(
+            names, one, CellFit(left * one, one, 8.0 * one, 1.4 * one, nats), left == 1.0
+        )
 
     search.likelihood = cast("HeldOutLikelihood", MadeUp())
     search.__dict__.update(_has=(), _progress=lambda _: None, _trial=made)
@@ -139,7 +141,7 @@ def test_all_cells_together_may_lack_what_none_does(*, ratio: float, explained: 
     """Each cell alone is unremarkable at 2.2 times its variance, known from 25 amplitudes."""
     made = likelihood()
     count = np.full(PARTS * 4, made.amplitudes)
-    bands = BandFit(ratio * made.variance, made.variance, count, 0.0, count)
+    bands = CellFit(ratio * made.variance, made.variance, count, count, 0.0)
     assert bands.adequate
     assert made.explains(bands) is explained
 
@@ -148,7 +150,7 @@ def test_a_healthy_record_does_not_hide_what_another_leaves() -> None:
     made = evolve(likelihood(), healthy=np.array([True, False]))
     count = np.full(PARTS * 4, made.amplitudes)
     ratio = np.broadcast_to([0.0, 2.2], (PARTS, 2, 2)).ravel()
-    assert not made.explains(BandFit(ratio * made.variance, made.variance, count, 0.0, count))
+    assert not made.explains(CellFit(ratio * made.variance, made.variance, count, count, 0.0))
 
 
 def test_one_cell_may_lack_what_the_others_do_not() -> None:
@@ -156,7 +158,7 @@ def test_one_cell_may_lack_what_the_others_do_not() -> None:
     count = np.full(PARTS * 4, made.amplitudes)
     power = made.variance.copy()
     power[5] *= 1e4
-    assert not made.explains(BandFit(power, made.variance, count, 0.0, count))
+    assert not made.explains(CellFit(power, made.variance, count, count, 0.0))
 
 
 def test_outside_is_likelier_than_a_model_that_leaves_much() -> None:

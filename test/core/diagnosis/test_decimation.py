@@ -100,7 +100,7 @@ def test_noise_sampled_less_often_is_as_loud_in_fewer_bands(noise: float, factor
 
 
 def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same candidates, in the same order of what they cost; unseen bands cost less than 1."""
+    """The same candidates, by what each costs beyond the first: unseen bands cost the same."""
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_for(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
     quick = begun(CandidateFitter((whole,), chain))
@@ -108,7 +108,8 @@ def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatc
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
-    np.testing.assert_allclose(list(quick.values()), list(slow.values()), rtol=0.05, atol=1.0)
+    beyond = [np.array(list(each.values())) - each["delay", ""] for each in (quick, slow)]
+    np.testing.assert_allclose(*beyond, rtol=0.2, atol=1.0)
 
 
 def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:

@@ -19,15 +19,10 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.likelihood import (
-    FORMULA_ERRORS,
-    BandFit,
-    known_freedom,
-    known_variance,
-    log_density,
-)
+from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, CellFit
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
+from afm_scan_ros.core.diagnosis.variance import CellVariance, log_density
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import chain_of
@@ -39,10 +34,10 @@ PERIOD, RESONANCE = 1e-4, 1000.0
 EDGES = np.array(band_edges(PERIOD, RESONANCE))
 
 
-def fit_of_tails(*tails: float) -> BandFit:
+def fit_of_tails(*tails: float) -> CellFit:
     """Bands of healthy variance 1 m² whose residual is exceeded with these probabilities."""
     power = fisher.isf(np.array(tails), NU, KAPPA)
-    return BandFit(power, np.ones(len(tails)), np.full(len(tails), KAPPA), 0.0)
+    return CellFit(power, *np.outer((1.0, KAPPA, NU), np.ones(len(tails))), 0.0)
 
 
 @pytest.mark.parametrize("power", [0.0, 0.5, 4.0, 100.0])
@@ -51,7 +46,7 @@ def test_the_density_is_that_of_the_page(power: float) -> None:
     by_hand = -NU / 2 * np.log(variance) - (NU + KAPPA) / 2 * np.log1p(
         NU * power / KAPPA / variance
     )
-    found = log_density(np.array(power), np.array(variance), np.array(KAPPA))
+    found = log_density(np.array(power), np.array(variance), np.array(KAPPA), np.array(NU))
     assert found == pytest.approx(by_hand)
 
 
@@ -68,15 +63,18 @@ def limit(rms: float, noise: float) -> DetectionLimit:
 
 
 def test_the_variance_is_noise_and_three_tenths_of_the_discrepancy() -> None:
-    assert known_variance(limit(5.0, 3.0)) == pytest.approx([9.0 + 0.3 * 16.0])
+    found = CellVariance.of_motion(limit(5.0, 3.0), KAPPA)
+    assert found.total == pytest.approx([9.0 + 0.3 * 16.0])
+    assert found.freedom == pytest.approx([NU])
 
 
 def test_an_untested_error_is_known_from_two_amplitudes() -> None:
     view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
     tested = Evidence(Playback(view), limit(1.0, 1.0))
-    assert known_freedom(tested) == pytest.approx([KAPPA])
+    assert tested.variance.known == pytest.approx([KAPPA])
     moved = untested_motion((), np.sin(np.arange(1000.0)), PERIOD, RESONANCE)
-    assert known_freedom(evolve(tested, untested=moved)) == pytest.approx([UNTESTED])
+    untested = Evidence(tested.playback, tested.limit, moved)
+    assert untested.variance.known == pytest.approx([UNTESTED])
 
 
 @pytest.mark.parametrize(("tail", "searched"), [(0.007, True), (0.014, False)])
@@ -208,7 +206,7 @@ def test_the_error_of_a_formula_counts_inside_the_range_alone(
     power: float, seconds: float, verdict: str
 ) -> None:
     """At an end of its range an effect must explain the residual as if its formula were exact."""
-    left = BandFit(np.array([power]), np.array([30.0]), np.array([KAPPA]), 0.0)
+    left = CellFit(*(np.array([each]) for each in (power, 30.0, KAPPA, NU)), 0.0)
     fit = Fit(np.array([[seconds]]), np.array([0.1]))
     trial = FittedCandidates((Candidate(effect_type("rate_dependent_hysteresis"), LAG),), fit, left)
     without = evolve(left, log_likelihood=-100.0)

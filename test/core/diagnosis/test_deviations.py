@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit, ParameterLayout
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
@@ -43,7 +43,7 @@ def test_values_stay_within_their_range(value: float) -> None:
     (parameter,) = form.parameters
     start = parameter.nearest(value)
     fit = Fit(np.array([[start]]), np.ones(1), 0.0, np.array([[10.0 * parameter.upper]]))
-    none = BandFit(*3 * (np.zeros(0),), 0.0)
+    none = CellFit(*4 * (np.zeros(0),), 0.0)
     (near,) = FittedCandidates((Candidate(effect, form),), fit, none).deviated(
         chain_of(default_model().x), 0.1
     )

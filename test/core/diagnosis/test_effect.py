@@ -14,7 +14,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
 )
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit, inserted
-from afm_scan_ros.core.diagnosis.likelihood import BandFit, Likelihood
+from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
@@ -35,9 +35,9 @@ def candidate(name: str) -> Candidate:
     return Candidate(effect_type(name), effect_type(name).forms[0])
 
 
-def trial(names: tuple[str, ...], bands: BandFit) -> FittedCandidates:
+def trial(names: tuple[str, ...], cells: CellFit) -> FittedCandidates:
     rows = np.array([[value for name in names for value in VALUES[name]]])
-    return FittedCandidates(tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0])), bands)
+    return FittedCandidates(tuple(map(candidate, names)), Fit(rows, 0.01 * np.abs(rows[0])), cells)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def answer(chain: Chain, healthy: Record) -> Array:
 
 def traced(healthy: Record, *names: str, others: tuple[str, ...] = ()) -> AxisDiagnosis:
     """A scan of x with effects that are known, as if they had been found so."""
-    none = BandFit(*3 * (np.zeros(0),), 0.0)
+    none = CellFit(*4 * (np.zeros(0),), 0.0)
     chain = inserted(CHAIN, [candidate(n).form for n in names], trial(names, none).fit.rows)
     moved = answer(chain, healthy) - answer(CHAIN, healthy)
     wrong = healthy.displacement + np.outer(moved, [1.0, 0.0])
@@ -148,7 +148,7 @@ def test_the_model_is_sufficient_where_it_is_the_most_probable(
     """An effect nearly as probable is not named; one far more probable is."""
     trace = traced(healthy, "drift")
     reached = trace.selection.trials[0]
-    without = evolve(reached.bands, log_likelihood=reached.log_posterior + none)
+    without = evolve(reached.cells, log_likelihood=reached.log_posterior + none)
     posterior = Posterior.of(without, [reached])
     selection = Selection(without, (reached,), posterior)
     assert evolve(trace, selection=selection).verdict == verdict

@@ -6,8 +6,8 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.bands import band_products, coefficients
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND
+from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.diagnosis.experiments import (
     Hypothesis,
@@ -18,7 +18,7 @@ from afm_scan_ros.core.diagnosis.experiments import (
     information,
     propose,
 )
-from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM
+from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.record import Record
@@ -53,14 +53,16 @@ def predicted(seed: int, *counts: int) -> Array:
 
 
 def products_of(signals: Array) -> Array:
-    found = coefficients(signals)
-    return band_products(found, found, EDGES, PERIOD)
+    cells = RecordCells(EDGES, signals.shape[1], PERIOD)
+    found = cells.coefficients(signals)
+    return cells.products(found, found)
 
 
 def told(signals: Array, *counts: int, known: float = KNOWN_FREEDOM) -> tuple[float, float]:
     products = products_of(signals)
     variances, equal = np.ones((len(counts), BANDS)), np.zeros(len(counts))
-    return information(products, counts, variances, np.full(BANDS, known), equal)
+    each = np.full(BANDS, known), np.full(BANDS, FREEDOM)
+    return information(products, counts, variances, *each, equal)
 
 
 @given(seed=seeds, counts=st.lists(st.integers(0, 3), min_size=1, max_size=4))
@@ -85,11 +87,11 @@ def test_bits_never_fall_with_the_amplitude(seed: int, sizes: tuple[float, float
 def test_what_a_parameter_absorbs_is_no_information(seed: int, sure: float) -> None:
     """The distance falls as the parameter is known less; in the end nothing is left of it."""
     moved = np.random.default_rng(seed).standard_normal(SAMPLES)
-    variance, known = np.ones(BANDS), np.full(BANDS, KNOWN_FREEDOM)
+    each = np.outer((1.0, KNOWN_FREEDOM, FREEDOM), np.ones(BANDS))
 
     def apart(deviation: float) -> float:
         signals = np.array([moved, deviation * moved, deviation * moved])
-        return distance(products_of(signals), 2, variance, known)
+        return distance(products_of(signals), 2, *each)
 
     assert apart(1.0) <= apart(sure) + 1e-9 <= apart(0.0) + 2e-9
     assert apart(1e3) == pytest.approx(0.0, abs=1e-5)
@@ -108,7 +110,7 @@ def test_distance_is_that_of_normal_distributions() -> None:
     exact += 0.5 * (logs[0] - 0.5 * (logs[1] + logs[2]))
     signals = np.array([difference, one, other])
     products = (signals @ signals.T)[np.newaxis]
-    found = distance(products, 2, np.array([variance]), np.array([1e9]))
+    found = distance(products, 2, *(np.array([each]) for each in (variance, 1e9, freedom)))
     assert found == pytest.approx(exact, rel=1e-5)
 
 

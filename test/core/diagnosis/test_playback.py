@@ -61,7 +61,7 @@ FILM = ("rate_dependent_hysteresis", "film", 2e-4)
         (("drift", "", 1e-8, 10.0), ("drift", "", 2e-8, 10.0), 1),
         (("parameter_shift", "creep", 1.1, 1.0), ("parameter_shift", "creep", 1.2, 1.0), 2),
         (("delay", "", 1e-5), ("delay", "", 2e-5), 3),
-        (("input_lag", "", 1e-5), ("input_lag", "", 2e-5), STAGES),
+        (("input_lag", "", 1e-5), ("input_lag", "", 2e-5), STAGES + 1),
     ],
 )
 def test_only_what_follows_a_change_is_evaluated(
@@ -70,7 +70,10 @@ def test_only_what_follows_a_change_is_evaluated(
     count: int,
     evaluated: list[Cascade],
 ) -> None:
-    """Beside a film, of which one evaluation takes longer than all others together."""
+    """Beside a film, of which one evaluation takes longer than all others together.
+
+    The first stage is evaluated at rest too.
+    """
     played = playback()
     first = played.displacement(inserted(inserted(BASE, *FILM), *before))
     evaluated.clear()

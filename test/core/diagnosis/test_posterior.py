@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, Posterior
 from afm_scan_ros.core.effects.registry import effect_type
 
 NATS = st.floats(-50.0, 50.0)
 
 
-def fit(nats: float) -> BandFit:
-    return BandFit(np.ones(1), np.ones(1), np.full(1, 8.0), nats)
+def fit(nats: float) -> CellFit:
+    return CellFit(np.ones(1), np.ones(1), np.full(1, 8.0), np.full(1, 1.4), nats)
 
 
 def trial(nats: float, *forms: tuple[str, str]) -> FittedCandidates:
@@ -96,7 +96,7 @@ def test_a_set_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred
     relative: float, chosen: tuple[str]
 ) -> None:
     lacking = evolve(
-        trial(0.0, DELAY), bands=evolve(trial(0.0, DELAY).bands, power=np.full(1, 1e6))
+        trial(0.0, DELAY), cells=evolve(trial(0.0, DELAY).cells, power=np.full(1, 1e6))
     )
     found = Posterior.of(fit(-90.0), [lacking, trial(float(np.log(relative)), LAG)])
     assert next(iter(found.logs)) == ("delay",)

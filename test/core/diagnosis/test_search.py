@@ -16,8 +16,9 @@ from afm_scan_ros.core.diagnosis.candidates import (
     InitialFit,
 )
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.likelihood import KNOWN_FREEDOM, BandFit, log_density
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, Selection
+from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, log_density
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array
@@ -29,11 +30,11 @@ Left = Mapping[tuple[str, ...], float]
 """Rms of every band over the healthy one, with some effects or more than these."""
 
 
-def fit(names: Iterable[str], left: Left) -> BandFit:
+def fit(names: Iterable[str], left: Left) -> CellFit:
     present = set(names)
     rms = min(value for needed, value in left.items() if present.issuperset(needed))
-    power, variance, known = np.full(BANDS, rms**2), np.ones(BANDS), np.full(BANDS, KNOWN_FREEDOM)
-    return BandFit(power, variance, known, float(np.sum(log_density(power, variance, known))))
+    cells = np.outer((rms**2, 1.0, KNOWN_FREEDOM, FREEDOM), np.ones(BANDS))
+    return CellFit(*cells, float(np.sum(log_density(*cells))))
 
 
 @frozen(eq=False)
@@ -82,7 +83,7 @@ class Foretold(CandidateFitter):
 
 
 def selected(fitter: CandidateFitter) -> Selection:
-    features = cast("ResidualFeatures", None)
+    features = ResidualFeatures(1.0, *4 * (np.zeros(2),), ())
     return ModelSearch(fitter, lambda _: features, lambda _: None).select()
 
 

@@ -11,7 +11,7 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import time_varying
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Problem
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Scan
@@ -23,7 +23,7 @@ from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=20.0, lines=16, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-NO_BANDS = BandFit(*3 * (np.zeros(0),), 0.0)
+NO_CELLS = CellFit(*4 * (np.zeros(0),), 0.0)
 CURVATURE = 500.0  # 1/m
 
 
@@ -35,7 +35,8 @@ def healthy() -> Scan:
 def with_added(done: Scan, added: Array, number: int = 0) -> Evidence:
     measured = evolve(done.measured, x=done.measured.x + added)
     observed = Record.of_traces("scan", done.drive, measured, SPEC)
-    return evidence_of("x", default_model(), observed, number)
+    found = evidence_of("x", default_model(), observed, number)
+    return Evidence(found.playback, found.limit)
 
 
 def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
@@ -44,7 +45,7 @@ def changing(name: str, kind: str, *evidence: Evidence) -> tuple[int, ...]:
     start = np.tile(form.neutral, (len(evidence), 1))
     found = Problem(evidence, CHAIN, [form]).descend(start)
     assert found is not None
-    selected = FittedCandidates((Candidate(effect_type(name), form),), found, NO_BANDS)
+    selected = FittedCandidates((Candidate(effect_type(name), form),), found, NO_CELLS)
     return tuple(time_varying(evidence, CHAIN, selected))
 
 

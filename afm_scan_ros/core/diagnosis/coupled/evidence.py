@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import combine_pvalues
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, LevelError
-from afm_scan_ros.core.diagnosis.likelihood import FALSE_LACK, BandFit
+from afm_scan_ros.core.diagnosis.likelihood import FALSE_LACK, CellFit
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
 from afm_scan_ros.core.identification.state_space.identify import (
@@ -160,7 +160,7 @@ class HeldOutLikelihood:
         output[:, :, later] = model.steady_state(self.drive[:, :, later])
         return output
 
-    def fit(self, simulated: Array, *, exact: bool = False) -> BandFit:
+    def fit(self, simulated: Array, *, exact: bool = False) -> CellFit:
         """Fit of an output (samples, p, records), over all parts of the band that are driven.
 
         It has no formula that may be inexact where it is ``exact``, as a linear structure is.
@@ -168,9 +168,9 @@ class HeldOutLikelihood:
         power, added = (self._power(of - simulated) for of in (self.output, self.base))
         added = np.zeros_like(added) if exact else added
         count = np.full(len(power), self.amplitudes)
-        return BandFit.of(power, added, self.variance, count, count)
+        return CellFit.of(power, added, self.variance, count, count)
 
-    def explains(self, bands: BandFit) -> bool:
+    def explains(self, bands: CellFit) -> bool:
         """Whether a fit lacks nothing: in no cell, and not in all together by Fisher's method.
 
         All together are those of the records that are diagnosed. The error is stated for all

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, elements_of, valued
 from afm_scan_ros.core.diagnosis.candidates import EXPECTED
 from afm_scan_ros.core.diagnosis.coupled.evidence import DiagnosedRecords, HeldOutLikelihood
-from afm_scan_ros.core.diagnosis.likelihood import BandFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import NEARLY, OUTSIDE, Names
 from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS, changes_linearly
@@ -37,7 +37,7 @@ class FittedSet:
 
     names: Names
     simulated: Array
-    bands: BandFit
+    bands: CellFit
     adequate: bool
 
     @property

@@ -1,0 +1,119 @@
+"""Cells of a record: bands of its coefficients, apart with the motion and between its harmonics.
+
+What a model gets wrong about a motion that repeats, repeats with it, but for slow changes. So the
+bands with the motion hold the model's error. In those between its harmonics sensor noise and
+disturbances are nearly alone. The mean squares of the cells add up to that of the signal. Where the
+motion does not repeat, all is with the motion.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from attrs import evolve, field, frozen
+from scipy.fft import idct
+
+from afm_scan_ros.core.bands import bounds, coefficients
+from afm_scan_ros.core.diagnosis.repetition import Repetition
+from afm_scan_ros.core.types import Array, floats
+
+
+@frozen(eq=False, slots=False)
+class RecordCells:
+    """Cells of signals of ``count`` samples, in n bands between n + 1 ``edges`` (Hz).
+
+    They are the bands with the motion, and then, where it repeats, those between its harmonics.
+    """
+
+    edges: tuple[float, ...] = field(converter=floats)
+    count: int
+    sample_period: float
+    repetition: Repetition | None = None
+
+    def repeating(
+        self, drive: Array, rates: Sequence[float], within: tuple[int, int] | None = None
+    ) -> "RecordCells":
+        """Return the cells where a drive (n,) repeats at one of some ``rates`` (Hz).
+
+        Rates are exact where the samples ``within`` which it repeats are known. Else they are those
+        of spectral lines, and the one found is refined. The first period has what the approach
+        leaves, so it is left out.
+        """
+        first, last = within or (0, self.count)
+        duration = (last - first) * self.sample_period
+        tried = [Repetition(first, last, rate * duration) for rate in rates if last > first]
+        found = min(tried, key=lambda each: each.share_between(drive), default=None)
+        if found and not within:
+            found = found.refined(drive)
+        if found is None or found.share_between(drive) > found.settings.largest_share:
+            return self
+        later = found.without_first()
+        return evolve(self, repetition=later if later.slow else None)
+
+    @property
+    def bands(self) -> int:
+        """Number of bands."""
+        return len(self.edges) - 1
+
+    @cached_property
+    def counts(self) -> Array:
+        """Number of coefficients (cells,) of each; at least one."""
+        every, of = np.diff(self.firsts[0]).astype(np.float64), self.repetition
+        if of is None:
+            return np.asarray(np.maximum(every, 1.0))
+        faster = np.diff(np.maximum(self.firsts[1], of.slower))
+        between = faster * (1.0 - of.slow / of.periods)
+        return np.asarray(np.maximum(np.concatenate((every - between, between)), 1.0))
+
+    def coefficients(self, signals: Array) -> Array:
+        """Coefficients (m, k) of signals (m, n), without the mean; squares add to mean squares."""
+        between = self.between(signals)
+        if self.repetition is not None:
+            signals = signals - self.repetition.signals(between, self.count) * math.sqrt(self.count)
+        return np.hstack((coefficients(signals), between))
+
+    def between(self, signals: Array) -> Array:
+        """Coefficients (m, l) of signals (m, n) between the harmonics, the last l of all."""
+        if self.repetition is None:
+            return np.empty((len(signals), 0))
+        return self.repetition.between(signals) / math.sqrt(self.count)
+
+    def with_motion(self, signals: Array) -> Array:
+        """Coefficients (m, k) of signals (m, n), those between the harmonics left out as zero."""
+        found = self.coefficients(signals)
+        found[:, self.count :] = 0.0
+        return found
+
+    def signal(self, coefficients: Array) -> Array:
+        """Signal (n,) of coefficients (k,)."""
+        found = idct(coefficients[: self.count], norm="ortho")
+        if self.repetition is not None:
+            between = coefficients[np.newaxis, self.count :]
+            found = found + self.repetition.signals(between, self.count)[0]
+        return np.asarray(found * math.sqrt(self.count))
+
+    def products(self, one: Array, other: Array) -> Array:
+        """Mean products (cells, m, l) of signals of coefficients (m, k) and (l, k)."""
+        return np.array([one[:, part] @ other[:, part].T for part in self._parts])
+
+    def power(self, coefficients: Array) -> Array:
+        """Mean square (cells,) of a signal of coefficients (k,)."""
+        squares = coefficients**2
+        return np.array([squares[part].sum() for part in self._parts])
+
+    def spread(self, values: Array) -> Array:
+        """Values of the cells (cells,) for each of the coefficients."""
+        return np.repeat(values, [part.stop - part.start for part in self._parts])
+
+    @cached_property
+    def firsts(self) -> list[tuple[int, ...]]:
+        """First coefficients of the bands, of the whole and of what is between."""
+        counts = [self.count, *([self.repetition.count] if self.repetition else [])]
+        return [bounds(self.edges, count, self.sample_period) for count in counts]
+
+    @cached_property
+    def _parts(self) -> list[slice]:
+        begun = zip((0, self.count), self.firsts, strict=False)
+        return [slice(at + a, at + b) for at, each in begun for a, b in pairwise(each)]

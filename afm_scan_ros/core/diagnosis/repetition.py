@@ -1,0 +1,126 @@
+"""Parts of a signal with a motion that repeats, and between the motion's harmonics.
+
+The part with the motion is, at each phase of the period, a slow course over the periods: the first
+few cosines, and whatever is slower than half the rate of repetition. The part between the harmonics
+is the rest. The parting is an orthogonal projection.
+"""
+
+import math
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+from scipy.optimize import minimize_scalar
+
+from afm_scan_ros.core.diagnosis.settings import PARTING, PartingSettings
+from afm_scan_ros.core.types import Array
+
+
+@frozen
+class Repetition:
+    """Samples from ``first`` to before ``last`` in which a motion repeats ``periods`` times."""
+
+    first: int
+    last: int
+    periods: float
+    settings: PartingSettings = PARTING
+
+    @property
+    def slow(self) -> int:
+        """Cosines by which the part with the motion may change; 0 where the periods are few."""
+        return min(self.settings.slow_courses, int(self.periods / self.settings.periods_each))
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return self.last - self.first
+
+    def between(self, signals: Array) -> Array:
+        """Coefficients (m, k) of the part between the harmonics, of signals (m, n)."""
+        found = self._changing(dct(signals[:, self.first : self.last], norm="ortho"))
+        found[:, : self.slower] = 0.0
+        return found
+
+    def _changing(self, coefficients: Array) -> Array:
+        """Coefficients (m, k) without the slow courses of what repeats."""
+        samples, length = self._period
+        finer = np.zeros((len(coefficients), length))
+        finer[:, : self.count] = coefficients
+        repeated = _slow_courses(idct(finer, norm="ortho"), samples, self.slow)
+        return np.asarray(coefficients - dct(repeated, norm="ortho")[:, : self.count])
+
+    def signals(self, between: Array, count: int) -> Array:
+        """Signals (m, count) of the part between the harmonics, of its coefficients (m, k)."""
+        found = np.zeros((len(between), count))
+        found[:, self.first : self.last] = idct(between, norm="ortho")
+        return found
+
+    @property
+    def slower(self) -> int:
+        """Coefficients that are slower than half the rate of repetition."""
+        return int(self.periods)
+
+    def clear(self, periods: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Whether frequencies, in periods in all, are between the harmonics, by some ``margin``."""
+        turns = periods / self.periods
+        apart = np.minimum(np.abs(turns - np.round(turns)), turns - 0.5)
+        return np.asarray(apart * self.periods > 0.5 * self.slow + margin + self.settings.precision)
+
+    def without_first(self) -> "Repetition":
+        """Return that of all periods but the first."""
+        first = self.first + round(self.count / self.periods)
+        periods = self.periods * (self.last - first) / self.count
+        return evolve(self, first=first, periods=periods)
+
+    def halved(self, count: int) -> "Repetition":
+        """Return that of every other sample, of which there are ``count``."""
+        first, last = -(-self.first // 2), min(self.last // 2, count)
+        periods = self.periods * 2 * (last - first) / self.count
+        return evolve(self, first=first, last=last, periods=periods)
+
+    def refined(self, moved: Array) -> "Repetition":
+        """Return the number of periods near this one that leaves least of a motion (n,) between."""
+        near = self.settings.search
+        found = minimize_scalar(
+            lambda each: evolve(self, periods=each).share_between(moved),
+            bounds=(self.periods - near, self.periods + near),
+            method="bounded",
+            options={"xatol": self.settings.precision},
+        )
+        both = self, evolve(self, periods=float(found.x))
+        return min(both, key=lambda each: each.share_between(moved))
+
+    def share_between(self, moved: Array) -> float:
+        """Share of the mean square of a motion (n,) that does not repeat."""
+        seen = moved[np.newaxis, self.first : self.last]
+        if not self.slow or not np.ptp(seen):
+            return 1.0
+        power = np.sum(self._changing(dct(seen, norm="ortho")) ** 2)
+        return float(power / np.var(seen) / self.count)
+
+    @property
+    def _period(self) -> tuple[int, int]:
+        """Samples of a period, and of all, at the rate nearest to a whole number of both.
+
+        The rate is at least that of the record, so no coefficient is lost.
+        """
+        least = max(math.ceil(self.count / self.periods), 1)
+        tried = np.arange(least, max(int(self.settings.finer * least), least + 8) + 1)
+        misfit = np.abs(tried * self.periods - np.round(tried * self.periods)) / tried
+        samples = int(tried[int(misfit.argmin())])
+        return samples, max(round(samples * self.periods), self.count)
+
+
+def _slow_courses(signals: Array, samples: int, slow: int) -> Array:
+    """Course over the periods of so many ``samples``, at each phase, of signals (m, n)."""
+    length = signals.shape[1]
+    whole, rest = divmod(length, samples)
+    padded = np.zeros((len(signals), (whole + 1) * samples))
+    padded[:, :length] = signals
+    by_period = padded.reshape(len(signals), whole + 1, samples)
+    for count, phases in ((whole + 1, slice(rest)), (whole, slice(rest, samples))):
+        basis = idct(np.eye(slow, count), norm="ortho")
+        seen = by_period[:, :count, phases]
+        by_period[:, :count, phases] = basis.T @ (basis @ seen)
+    return padded[:, :length]

@@ -1,0 +1,81 @@
+"""The numbers by which a residual is parted, and what each follows from."""
+
+from attrs import frozen
+
+from afm_scan_ros.core.settings import setting
+
+
+@frozen
+class PartingSettings:
+    """What of a residual repeats with the motion, and which lines between last."""
+
+    slow_courses: int = setting(
+        4,
+        "1",
+        "courses over the record by which what repeats may change, at most",
+        "with n of them a harmonic is n/2 over the record's length wide on either side",
+    )
+    periods_each: int = setting(
+        4,
+        "1",
+        "periods of the motion for each of these courses",
+        "three quarters of the coefficients lie between the harmonics then",
+    )
+    largest_share: float = setting(
+        0.01,
+        "1",
+        "share of a drive's mean square that need not repeat at its rate",
+        "a tenth in amplitude: a ramp over many lines leaves less than half of it",
+    )
+    search: float = setting(
+        0.6,
+        "periods",
+        "to either side of a spectral line, where the number of periods is sought",
+        "a line of a record is known to half a period",
+    )
+    finer: float = setting(
+        1.3,
+        "1",
+        "factor of the sample rate up to which a whole number of samples a period is sought",
+        "among a third of the samples of a period one misses a whole number by little",
+    )
+    false_alarm: float = setting(
+        0.01, "1", "probability that the noise of a record shows a line", "the rate asked for"
+    )
+    neighbourhood: int = setting(
+        101,
+        "1",
+        "values of the periodogram whose median tells the noise at a line",
+        "fifty independent ones tell it to a fifth",
+    )
+    clear: float = setting(
+        1.0,
+        "periods of the record",
+        "distance of a line from a harmonic beyond the harmonic's width",
+        "Rayleigh's criterion",
+    )
+    lasting: float = setting(
+        0.25,
+        "1",
+        "share of a line's amplitude that each half of a record has",
+        "a tone has a half, what decays within a tenth of the record less than a hundredth",
+    )
+    tones: int = setting(
+        16, "1", "tones that are taken out of a record, at most", "two combs of eight"
+    )
+    starts: int = setting(
+        2, "1", "lasting lines of each record that the fit of a tone starts from", "limits the work"
+    )
+    precision: float = setting(
+        1e-4, "periods", "to which the number of periods is sought", "a phase of 0.04 degrees"
+    )
+    other_noise: float = setting(
+        2.0,
+        "1",
+        "factor of a record's noise over that of the calibration, either way",
+        "more is another sensor, or no noise",
+    )
+
+
+PARTING = PartingSettings()
+"""The defaults."""

@@ -1,0 +1,84 @@
+"""Spectral lines of a residual that neither the sensor's noise nor a transient explains.
+
+The periodogram of noise has an exponential distribution, and the largest of n independent values
+exceeds ln(n / p) times their mean with the probability p. The mean is that of the neighbourhood,
+by its median, since noise and what leaks of the model's error are smooth over a few lines. A tone
+lasts, so it has its share in both halves of the record; what decays after a move has not.
+"""
+
+import numpy as np
+import scipy
+
+from afm_scan_ros.core.diagnosis.repetition import Repetition
+from afm_scan_ros.core.diagnosis.settings import PARTING, PartingSettings
+from afm_scan_ros.core.types import Array
+
+
+def lasting_lines(
+    residual: Array,
+    sample_period: float,
+    of: Repetition | None,
+    settings: PartingSettings = PARTING,
+) -> tuple[float, ...]:
+    """Frequencies (Hz) of the lines of a residual (n,) that last, the clearest first.
+
+    Where a motion repeats, the residual is what is between its harmonics, ``of`` these samples.
+    """
+    count = len(residual)
+    halves = [np.fft.rfft(part, 2 * count) for part in np.array_split(residual, 2)]
+    frequencies = np.arange(count + 1, dtype=np.float64) / (2.0 * count * sample_period)
+    halves[1] *= np.exp(-2j * np.pi * frequencies * sample_period * -(-count // 2))
+    periods = frequencies * count * sample_period
+    kept = of.clear(periods, settings.clear) if of else periods > settings.clear
+    power = np.where(kept, np.abs(halves[0] + halves[1]) ** 2, 0.0)
+    mean = np.full(len(power), np.inf)
+    mean[kept] = _local_mean(power[kept], settings.neighbourhood)
+    least = np.minimum(*np.abs(halves)) ** 2
+    loud = (power > np.log(max(kept.sum(), 1) / settings.false_alarm) * mean) & (
+        least >= settings.lasting**2 * power
+    )
+    peaks = loud[1:-1] & (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
+    found = 1 + np.flatnonzero(peaks)
+    return tuple(frequencies[found[np.argsort(-power[found] / mean[found])]].tolist())
+
+
+def without_tones(
+    residual: Array,
+    sample_period: float,
+    of: Repetition | None,
+    settings: PartingSettings = PARTING,
+) -> Array:
+    """Residual (n,) without its lines that last, one after the other."""
+    left = residual
+    for _ in range(settings.tones):
+        found = lasting_lines(left, sample_period, of, settings)
+        if not found:
+            break
+        left = left - _tone(left, sample_period, found[0])
+    return left
+
+
+def _local_mean(power: Array, neighbourhood: int) -> Array:
+    """Mean (n,) of the neighbours of exponential values (n,), by their median; none at the ends."""
+    mean = scipy.ndimage.median_filter(power, neighbourhood, mode="nearest") / np.log(2.0)
+    half = neighbourhood // 2
+    mean[:half], mean[len(mean) - half :] = np.inf, np.inf
+    return np.asarray(mean)
+
+
+def _tone(residual: Array, sample_period: float, frequency: float) -> Array:
+    """Tone (n,) near a frequency that explains most of a residual (n,)."""
+    time = sample_period * np.arange(len(residual))
+
+    def fitted(at: float) -> Array:
+        wave = np.exp(2j * np.pi * at * time)
+        return np.asarray((2.0 / len(time) * (residual @ wave.conj()) * wave).real)
+
+    near = 0.5 / (len(time) * sample_period)
+    found = scipy.optimize.minimize_scalar(
+        lambda at: float(np.sum((residual - fitted(at)) ** 2)),
+        bounds=(frequency - near, frequency + near),
+        method="bounded",
+        options={"xatol": 1e-3 * near},
+    )
+    return fitted(float(found.x))

@@ -1,0 +1,155 @@
+"""Variance of the residual in the cells of a record, and from how many amplitudes it is known.
+
+Sensor noise and model discrepancy differ in their number of independent amplitudes. The discrepancy
+has few, wherever it lies, and so has a cell in which the model moves. Between the harmonics of a
+motion, and at rest, noise has as many as there are coefficients. The number of amplitudes of both
+together is Satterthwaite's (Biometrics Bull. 2, 1946, 110): with variances a and b of m and n
+amplitudes it is (a + b)² / (a²/m + b²/n).
+
+Between the harmonics the record itself tells the noise: by the median of the squared coefficients,
+once tones are taken out. What exceeds it there is the part of the discrepancy that does not repeat,
+or repeats with fast changes.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from attrs import frozen
+from scipy.fft import dct
+from scipy.stats import chi2
+
+from afm_scan_ros.core.diagnosis.cells import RecordCells
+from afm_scan_ros.core.diagnosis.discrepancy import SMALLEST, DetectionLimit
+from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.tones import without_tones
+from afm_scan_ros.core.types import Array
+
+FREEDOM, KNOWN_FREEDOM, UNTESTED_FREEDOM = 1.4, 8.0, 2.0
+"""Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k.
+
+The last is k where the discrepancy is known from other motion, or from fitted records alone.
+"""
+TYPICAL_SHARE = 0.3
+"""Mean square of the discrepancy over its detection limit, which is an upper bound."""
+
+
+def satterthwaite(one: Array, other: Array, of_one: Array | float, of_other: float) -> Array:
+    """Amplitudes of the sum of two variances, each of so many amplitudes."""
+    return np.asarray((one + other) ** 2 / (one**2 / of_one + other**2 / of_other))
+
+
+@frozen(eq=False)
+class CellVariance:
+    """Variance (cells,) of a residual in m², of which ``noise`` (cells,) is the sensor's.
+
+    ``freedom`` (cells,) are its independent amplitudes, ``known`` (cells,) those it is known from.
+    """
+
+    total: Array
+    noise: Array
+    freedom: Array
+    known: Array
+
+    @classmethod
+    def of_motion(cls, limit: DetectionLimit, tested: float) -> "CellVariance":
+        """Return that of a record that moves, by band; the discrepancy is known as ``tested``."""
+        noise, error = _parts(limit)
+        few = np.ones_like(noise)
+        return cls(noise + error, noise, FREEDOM * few, tested * few)
+
+    @classmethod
+    def of_noise(cls, noise: Array, error: Array, counts: Array, tested: float) -> "CellVariance":
+        """Return that of noise of so many amplitudes, and an error (cells,) of few, both in m²."""
+        freedom = satterthwaite(noise, error, counts, FREEDOM)
+        return cls(
+            noise + error, noise, freedom, satterthwaite(noise, error, KNOWN_FREEDOM, tested)
+        )
+
+    @classmethod
+    def at_rest(
+        cls, limit: DetectionLimit, cells: RecordCells, moved: Array, tested: float
+    ) -> "CellVariance":
+        """Return that of a record of little motion (n,), as whose error all of it counts."""
+        noise, error = _parts(limit)
+        return cls.of_noise(
+            noise,
+            np.maximum(error, cells.power(cells.coefficients(moved[np.newaxis])[0])),
+            cells.counts,
+            tested,
+        )
+
+    @classmethod
+    def repeating(
+        cls, limit: DetectionLimit, cells: RecordCells, moved: Array, residual: Array, tested: float
+    ) -> "CellVariance":
+        """Return that of a record whose motion repeats, of its predicted motion and residual (n,).
+
+        Between the harmonics lies as much of the discrepancy as of the motion, and at least what is
+        seen there of a residual without its tones.
+        """
+        both = cells.coefficients(moved[np.newaxis])[0]
+        along, between = cells.power(both).reshape(2, cells.bands)
+        noise, error = _parts(limit)
+        counts, shares = (
+            cells.counts.reshape(2, cells.bands),
+            between / (along + between + SMALLEST**2),
+        )
+        noises = counts / counts.sum(axis=0) * noise
+        power, floor = between_power(cells, residual)
+        factor = PARTING.other_noise**2
+        seen = np.clip(floor, noises[1] / factor, noises[1] * factor)
+        leak = np.maximum(power - seen, shares * error)
+        with_motion, few = noises[0] + (1.0 - shares) * error, np.ones(cells.bands)
+        rest = cls.of_noise(seen, leak, counts[1], tested)
+        return cls(
+            np.concatenate((with_motion, rest.total)),
+            np.concatenate((noises[0], rest.noise)),
+            np.concatenate((FREEDOM * few, rest.freedom)),
+            np.concatenate((tested * few, rest.known)),
+        )
+
+    @property
+    def expected_weights(self) -> Array:
+        """Weights (cells,) of a residual as expected, in 1/m²."""
+        return self.weights(self.total)
+
+    def weights(self, power: Array) -> Array:
+        """Minus twice the slope (cells,) of the log density over the ``power``, in 1/m²."""
+        return weights(power, self.total, self.known, self.freedom)
+
+
+def _parts(limit: DetectionLimit) -> tuple[Array, Array]:
+    """Variance (bands,) of noise and of discrepancy, m²."""
+    error = TYPICAL_SHARE * np.maximum(limit.rms**2 - limit.noise**2, 0.0)
+    return np.maximum(limit.noise, SMALLEST) ** 2, np.asarray(error)
+
+
+def log_density(power: Array, variance: Array, known: Array, freedom: Array) -> Array:
+    """Log likelihood of cells of mean square ``power``, in m² as the ``variance``.
+
+    The variance is ``known`` as from so many amplitudes, k. The power has those of ``freedom``, n.
+    Constant terms are left out.
+    """
+    excess = np.log1p(freedom * power / (known * variance))
+    return np.asarray(-0.5 * (freedom * np.log(variance) + (freedom + known) * excess))
+
+
+def weights(power: Array, variance: Array, known: Array, freedom: Array) -> Array:
+    """Minus twice the slope (cells,) of the log density over ``power``, in 1/m²."""
+    return np.asarray(freedom * (freedom + known) / (known * variance + freedom * power))
+
+
+def between_power(cells: RecordCells, residual: Array) -> tuple[Array, Array]:
+    """Mean square (bands,) between the harmonics without its tones, and that of the noise alone.
+
+    Noise is told by the median of the squared coefficients, as a few larger ones leave it alone.
+    """
+    if (of := cells.repetition) is None:
+        raise ValueError("the motion does not repeat")
+    seen = of.signals(of.between(residual[np.newaxis]), cells.count)[0, of.first : of.last]
+    squares = dct(without_tones(seen, cells.sample_period, of), norm="ortho") ** 2 / cells.count
+    clear = of.clear(np.arange(of.count, dtype=np.float64) / 2.0)
+    bands = [slice(*each) for each in pairwise(cells.firsts[1])]
+    kept = [squares[band][clear[band]] for band in bands]
+    medians = [np.median(few) / chi2.median(1) if len(few) else 0.0 for few in kept]
+    return np.array([squares[band].sum() for band in bands]), cells.counts[cells.bands :] * medians

@@ -1,0 +1,82 @@
+"""Noise has as many amplitudes as coefficients, the model's error few, wherever it lies."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from afm_scan_ros.core.diagnosis.cells import RecordCells
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
+from afm_scan_ros.core.diagnosis.repetition import Repetition
+from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.variance import (
+    FREEDOM,
+    KNOWN_FREEDOM,
+    CellVariance,
+    satterthwaite,
+)
+from afm_scan_ros.core.types import Array
+
+COUNT, PERIOD, PERIODS = 16_000, 1e-3, 40.0
+EDGES = (0.0, 3.0, 10.0, 30.0, 100.0, 500.0)
+CELLS = RecordCells(EDGES, COUNT, PERIOD, Repetition(0, COUNT, PERIODS))
+NOISE = np.sqrt(np.diff(EDGES) / EDGES[-1])
+LIMIT = DetectionLimit(EDGES, np.hypot(NOISE, 2.0), NOISE, 50.0)
+MOVED = 1e3 * np.interp(
+    np.linspace(0.0, PERIODS, COUNT, endpoint=False) % 1.0, (0.0, 0.5, 1.0), (-1.0, 1.0, -1.0)
+)
+SIZES = st.floats(1e-3, 1e3)
+
+
+def found(residual: Array) -> CellVariance:
+    return CellVariance.repeating(LIMIT, CELLS, MOVED, residual, KNOWN_FREEDOM)
+
+
+@given(one=SIZES, other=SIZES, few=SIZES, many=SIZES)
+def test_both_together_have_no_fewer_amplitudes_than_either(
+    one: float, other: float, few: float, many: float
+) -> None:
+    together = satterthwaite(np.array(one), np.array(other), few, many)
+    assert min(few, many) * (1.0 - 1e-9) <= together <= (few + many) * (1.0 + 1e-9)
+
+
+def test_noise_between_the_harmonics_has_as_many_amplitudes_as_coefficients() -> None:
+    """Those with the motion are few: what the model gets wrong there has no more."""
+    variance = found(np.random.default_rng(1).standard_normal(COUNT))
+    along, between = variance.freedom.reshape(2, CELLS.bands)
+    np.testing.assert_array_equal(along, FREEDOM)
+    np.testing.assert_array_less(100.0, between[2:])
+    np.testing.assert_allclose(
+        variance.total[CELLS.bands + 2 :], (CELLS.counts / COUNT)[CELLS.bands + 2 :], rtol=0.2
+    )
+
+
+def test_what_leaks_of_the_error_has_few_amplitudes() -> None:
+    """An error of the motion that changes from period to period leaves no room for more."""
+    rng = np.random.default_rng(2)
+    errs = np.repeat(rng.standard_normal(int(PERIODS)), COUNT // int(PERIODS)) * 3e-3 * MOVED
+    variance = found(errs + rng.standard_normal(COUNT))
+    leaking = CELLS.bands + 2
+    assert variance.freedom[leaking] < 0.1 * CELLS.counts[leaking]
+    assert variance.total[leaking] > 1.1 * variance.noise[leaking]
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.5])
+def test_the_record_tells_its_own_noise(factor: float) -> None:
+    """Within a factor of two of that of the calibration; a tone is no noise."""
+    tone = 0.3 * np.sin(2.0 * np.pi * 61.3 * PERIOD * np.arange(COUNT))
+    seen = found(factor * np.random.default_rng(3).standard_normal(COUNT) + tone)
+    expected = factor**2 * (CELLS.counts / COUNT)[CELLS.bands + 3]
+    assert seen.noise[CELLS.bands + 3] == pytest.approx(expected, rel=0.1)
+    loud = found(10.0 * np.random.default_rng(3).standard_normal(COUNT))
+    most = PARTING.other_noise**2 * (CELLS.counts / COUNT)[CELLS.bands + 3]
+    assert loud.noise[CELLS.bands + 3] == pytest.approx(most, rel=0.01)
+
+
+def test_at_rest_all_is_noise_but_what_moves() -> None:
+    cells = RecordCells(EDGES, COUNT, PERIOD)
+    still = DetectionLimit(EDGES, NOISE, NOISE, 50.0)
+    variance = CellVariance.at_rest(still, cells, np.zeros(COUNT), KNOWN_FREEDOM)
+    np.testing.assert_allclose(variance.freedom, cells.counts)
+    drifting = CellVariance.at_rest(still, cells, np.linspace(0.0, 3.0, COUNT), KNOWN_FREEDOM)
+    assert drifting.freedom[0] < 2.0 * FREEDOM
