@@ -78,7 +78,7 @@ def fit_axis(
         settle(fit, settings.most_steps, VIBRATION)
     fit = with_told_lags(fit, progress)
     if len(fit.layout.lacking(fit.theta)[1]):
-        progress("holding the surface of the hysteresis to growth")
+        progress("holding the hysteresis to its conditions")
         fit = _held_to_growth(fit)
     if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")

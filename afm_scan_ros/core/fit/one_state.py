@@ -23,6 +23,12 @@ from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, means
 from afm_scan_ros.core.types import Array
 
+AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
+"""Cubic B-splines at the knot between them."""
+LOWEST, HIGHEST = slice(3), slice(-3, None)
+EDGES = ((0, HIGHEST, 1.0), (0, LOWEST, -1.0), (1, LOWEST, 1.0), (1, HIGHEST, -1.0))
+"""Table of a rise or a fall, splines at an edge of w, and the sign of a slope that leads beyond."""
+
 
 @frozen(eq=False)
 class OneState:
@@ -200,9 +206,35 @@ class OneState:
         inside = np.clip(states, knots[3], knots[count + 3])
         return np.asarray(BSpline.design_matrix(inside, knots, 3).toarray())
 
+    def lacking(self, theta: Array) -> tuple[Array, Array]:
+        """Slopes by which a path leaves the cells, where it does, as linear conditions on theta.
+
+        At the highest w a path rises at most as steeply as the drive and falls at least so, at the
+        lowest the other way round. Records that never go there tell nothing of these slopes, and w
+        would run away. Returns what ``Growth.lacking`` does.
+        """
+        tables, found, lacks = theta.reshape(self.shape), [], []
+        for table, edge, way in EDGES:
+            beyond = way * tables[table][:, edge] @ AT_KNOT
+            for row in np.flatnonzero(beyond > 0.0):
+                condition = np.zeros(self.shape)
+                condition[table, row, edge] = -way * AT_KNOT
+                found.append(condition.ravel())
+                lacks.append(beyond[row])
+        tolerance = self.settings.slope_tolerance
+        return np.array(found).reshape(-1, theta.size) / tolerance, np.array(lacks) / tolerance
+
     def slopes(self, theta: Array, rest: Array) -> DuhemSlopes:
-        """Return the effect's parameters, for w (V) at depolarised rest, (1,), where F is 0."""
-        rising, falling = 1.0 + theta.reshape(self.shape)
+        """Return the effect's parameters, for w (V) at depolarised rest, (1,), where F is 0.
+
+        Where a path would leave the cells, their outermost slopes end at the drive's.
+        """
+        tables = 1.0 + theta.reshape(self.shape)
+        for table, edge, way in EDGES:
+            outer = tables[table][:, edge]
+            leaves = way * (outer @ AT_KNOT - 1.0) > self.settings.slope_tolerance
+            outer[leaves] = 1.0 + way * np.minimum(way * (outer[leaves] - 1.0), 0.0)
+        rising, falling = tables
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper
         offset = self.lower - float(rest[0])

@@ -142,14 +142,12 @@ class Layout:
         return result
 
     @cached_property
-    def _growth(self) -> Growth | None:
-        return Growth(self.operator) if isinstance(self.operator, Plays) else None
+    def _conditions(self) -> Growth | OneState:
+        return Growth(self.operator) if isinstance(self.operator, Plays) else self.operator
 
     def lacking(self, theta: Array) -> tuple[Array, Array]:
-        """Conditions that the plays' surface grows, where θ fails them: see ``Growth.lacking``."""
-        if self._growth is None:
-            return np.zeros((0, self.size)), np.zeros(0)
-        rows, lacks = self._growth.lacking(self.of_operator(theta))
+        """Conditions on the operator, where θ fails them: see ``lacking`` of each."""
+        rows, lacks = self._conditions.lacking(self.of_operator(theta))
         return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:

@@ -102,7 +102,7 @@ class FitSettings:
     slope_tolerance: float = setting(
         1e-5,
         "1",
-        "standard deviation by which slopes of plays fall short of least_slope",
+        "standard deviation by which slopes of an operator fail their conditions",
         "a thousandth of least_slope costs 2 nat",
     )
     map_terms: int = setting(

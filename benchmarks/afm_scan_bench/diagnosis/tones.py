@@ -22,7 +22,7 @@ SPECS = (
     ScanSpec(line_rate=10.0, lines=48, samples_per_line=1000),
     ScanSpec(line_rate=7.0, lines=40, samples_per_line=1430),
 )
-DRAWN = 6
+DRAWN = 4
 LOWEST = 1.0
 """Lowest frequency drawn, over the line rate."""
 TIMES = (1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 5.0, 10.0, 30.0)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from afm_scan_ros.core.effects.hysteresis.duhem import Duhem
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import LIMIT, OPERATORS, applied, levels, of_duhem
@@ -43,3 +44,27 @@ def test_slopes_stay_the_same_on_cells_that_reach_further() -> None:
     assert wider.widths[0] < -0.36
     assert wider.widths[1] > 0.4
     assert wider.covering(moved, np.array([-0.36, 0.4]))[0] is wider
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_path_leaves_the_cells(seed: int) -> None:
+    """Slopes that no record tells may be any; without their conditions w runs away by volts."""
+    rng = np.random.default_rng(seed)
+    operator = OneState(-LIMIT, LIMIT, (-0.3, 0.4))
+    theta = np.clip(rng.normal(0.0, 1.0, operator.parts["slopes"]), operator.lowest, None)
+    path = levels(seed, 60, 300)
+    output = Duhem(operator.slopes(theta, np.zeros(1)))
+    _, moved = output.apply(output.at_rest(), path)
+    w = moved - moved[0] - path
+    margin = 0.02 * (operator.widths[1] - operator.widths[0])
+    assert operator.widths[0] - margin <= w.min()
+    assert w.max() <= operator.widths[1] + margin
+
+
+def test_conditions_are_linear_and_met_by_slopes_of_the_drive() -> None:
+    operator = OneState(-LIMIT, LIMIT, (-0.3, 0.4))
+    assert len(operator.lacking(operator.unbent())[1]) == 0
+    theta = np.random.default_rng(1).normal(0.0, 1.0, operator.parts["slopes"])
+    rows, lacks = operator.lacking(theta)
+    assert len(lacks) > 0
+    np.testing.assert_allclose(rows @ theta, -lacks)
