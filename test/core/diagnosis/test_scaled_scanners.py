@@ -20,7 +20,8 @@ EFFECTS = {
     "drift": Added("drift", "", (5e-6, 0.2)),
     "": None,
 }
-FAINT = 5e-3
+FAINT = 0.05
+"""A fit ends within half a nat, whatever the units."""
 CASES = [
     ("static_nonlinearity", Scale(0.01, 100.0, 0.01)),
     ("extra_resonance", Scale(20.0, 0.01, 100.0)),
