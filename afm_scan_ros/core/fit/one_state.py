@@ -23,11 +23,16 @@ from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, means
 from afm_scan_ros.core.types import Array
 
-AT_KNOT = np.array([1.0, 4.0, 1.0]) / 6.0
-"""Cubic B-splines at the knot between them."""
-LOWEST, HIGHEST = slice(3), slice(-3, None)
-EDGES = ((0, HIGHEST, 1.0), (0, LOWEST, -1.0), (1, LOWEST, 1.0), (1, HIGHEST, -1.0))
-"""Table of a rise or a fall, splines at an edge of w, and the sign of a slope that leads beyond."""
+
+def _at_knot() -> Array:
+    """Cubic B-splines at the knot between them, (3,)."""
+    return np.array([1.0, 4.0, 1.0]) / 6.0
+
+
+def _edges() -> tuple[tuple[int, slice, float], ...]:
+    """Table of a rise or a fall, splines at an edge of w, and the sign of a slope that leaves."""
+    lowest, highest = slice(3), slice(-3, None)
+    return (0, highest, 1.0), (0, lowest, -1.0), (1, lowest, 1.0), (1, highest, -1.0)
 
 
 @frozen(eq=False)
@@ -214,11 +219,11 @@ class OneState:
         would run away. Returns what ``Growth.lacking`` does.
         """
         tables, found, lacks = theta.reshape(self.shape), [], []
-        for table, edge, way in EDGES:
-            beyond = way * tables[table][:, edge] @ AT_KNOT
+        for table, edge, way in _edges():
+            beyond = way * tables[table][:, edge] @ _at_knot()
             for row in np.flatnonzero(beyond > 0.0):
                 condition = np.zeros(self.shape)
-                condition[table, row, edge] = -way * AT_KNOT
+                condition[table, row, edge] = -way * _at_knot()
                 found.append(condition.ravel())
                 lacks.append(beyond[row])
         tolerance = self.settings.slope_tolerance
@@ -230,9 +235,9 @@ class OneState:
         Where a path would leave the cells, their outermost slopes end at the drive's.
         """
         tables = 1.0 + theta.reshape(self.shape)
-        for table, edge, way in EDGES:
+        for table, edge, way in _edges():
             outer = tables[table][:, edge]
-            leaves = way * (outer @ AT_KNOT - 1.0) > self.settings.slope_tolerance
+            leaves = way * (outer @ _at_knot() - 1.0) > self.settings.slope_tolerance
             outer[leaves] = 1.0 + way * np.minimum(way * (outer[leaves] - 1.0), 0.0)
         rising, falling = tables
         slope = np.ones(self.settings.slope_cells_drive + 3)
