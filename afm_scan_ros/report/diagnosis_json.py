@@ -159,9 +159,9 @@ def _cells(evidence: Evidence) -> Document:
     variance, repetition = evidence.variance, evidence.cells.repetition
     return {
         "periods": repetition and repetition.periods,
-        "variance_m2": _plain(variance.total),
-        "freedom": _plain(variance.freedom),
-        "known_from": _plain(variance.known),
+        "variance_m2": variance.total.tolist(),
+        "freedom": variance.freedom.tolist(),
+        "known_from": variance.known.tolist(),
     }
 
 
@@ -180,7 +180,7 @@ def _fit(found: CellFit | None) -> Document:
     return {
         "log_likelihood": found.log_likelihood,
         "log_base": found.log_base,
-        "cell_rms_m": _plain(np.sqrt(found.power)),
+        "cell_rms_m": np.sqrt(found.power).tolist(),
     }
 
 

@@ -233,7 +233,7 @@ def diagnose_axis(
     chain = chain_of(model.axis(axis))
     given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
     free, evidence = with_base_parameters(given, chain)
-    fresh = tuple(each.from_depolarised() for each in evidence)
+    fresh = tuple(each.from_depolarised(chain) for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
         return _diagnosed(axis, _search(evidence, chain, progress), free)
     searches = [_search(each, chain, progress) for each in (evidence, fresh)]

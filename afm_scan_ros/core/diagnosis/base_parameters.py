@@ -70,7 +70,7 @@ def with_base_parameters(
 
 def _information(evidence: Evidence, influence: Array) -> Array:
     """Information (m,) of a record on each parameter over its prior's."""
-    moved = evidence.cells.with_motion(influence)
+    moved = evidence.cells.along(influence)
     power = np.diagonal(evidence.cells.products(moved, moved), axis1=1, axis2=2)
     return np.asarray(evidence.variance.weights(np.zeros(len(power))) @ power)
 

@@ -200,9 +200,11 @@ class CandidateFitter:
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
         forms = [candidate.form for candidate in candidates]
         evidence: Sequence[Evidence] = self.evidence
+        disturbed = any(p.located for form in forms for p in form.parameters)
+        seen = Evidence.whitened if disturbed else Evidence.whitened_along
         trial = None
         for _ in range(REWEIGHTINGS):
-            found = Problem(evidence, self.chain, forms, span=self.span).descend(rows)
+            found = Problem(evidence, self.chain, forms, seen, self.span).descend(rows)
             if found is None:
                 return None
             cells = self.likelihood.fit(inserted(self.chain, forms, found.rows))

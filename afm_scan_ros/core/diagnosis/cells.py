@@ -50,7 +50,7 @@ class RecordCells:
         if found is None or found.share_between(drive) > found.settings.largest_share:
             return self
         later = found.without_first()
-        return evolve(self, repetition=later if later.slow else None)
+        return evolve(self, repetition=later if later.courses else None)
 
     @property
     def bands(self) -> int:
@@ -63,16 +63,9 @@ class RecordCells:
         every, of = np.diff(self.firsts[0]).astype(np.float64), self.repetition
         if of is None:
             return np.asarray(np.maximum(every, 1.0))
-        faster = np.diff(np.maximum(self.firsts[1], of.slower))
-        between = faster * (1.0 - of.slow / of.periods)
+        faster = np.diff(np.maximum(self.firsts[1], of.below))
+        between = faster * (1.0 - of.courses / of.periods)
         return np.asarray(np.maximum(np.concatenate((every - between, between)), 1.0))
-
-    def coefficients(self, signals: Array) -> Array:
-        """Coefficients (m, k) of signals (m, n), without the mean; squares add to mean squares."""
-        between = self.between(signals)
-        if self.repetition is not None:
-            signals = signals - self.repetition.signals(between, self.count) * math.sqrt(self.count)
-        return np.hstack((coefficients(signals), between))
 
     def between(self, signals: Array) -> Array:
         """Coefficients (m, l) of signals (m, n) between the harmonics, the last l of all."""
@@ -80,27 +73,46 @@ class RecordCells:
             return np.empty((len(signals), 0))
         return self.repetition.between(signals) / math.sqrt(self.count)
 
-    def with_motion(self, signals: Array) -> Array:
-        """Coefficients (m, k) of signals (m, n), those between the harmonics left out as zero."""
-        found = self.coefficients(signals)
-        found[:, self.count :] = 0.0
+    def along(self, signals: Array) -> Array:
+        """Coefficients (m, k) of signals (m, n) that are all counted with the motion."""
+        between = np.zeros((len(signals), self.size - self.count))
+        return np.hstack((coefficients(signals), between))
+
+    def coefficients(self, signal: Array, between: Array | None = None) -> Array:
+        """Coefficients (k,) of a signal (n,), of which some (l,) are ``between`` the harmonics.
+
+        These are those of the signal itself where none are given. Squares add to the mean square,
+        the mean left out.
+        """
+        if between is None:
+            between = self.between(signal[np.newaxis])[0]
+        rest = signal - self._between_signal(between)
+        return np.append(coefficients(rest[np.newaxis])[0], between)
+
+    def _between_signal(self, between: Array) -> Array:
+        """Signal (n,) of coefficients (l,) between the harmonics."""
+        found = np.zeros(self.count)
+        if (of := self.repetition) is not None and len(between):
+            found[of.first : of.last] = of.signal(between * math.sqrt(self.count))
         return found
 
-    def signal(self, coefficients: Array) -> Array:
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return self.count + (self.repetition.count if self.repetition else 0)
+
+    def signal(self, found: Array) -> Array:
         """Signal (n,) of coefficients (k,)."""
-        found = idct(coefficients[: self.count], norm="ortho")
-        if self.repetition is not None:
-            between = coefficients[np.newaxis, self.count :]
-            found = found + self.repetition.signals(between, self.count)[0]
-        return np.asarray(found * math.sqrt(self.count))
+        along = idct(found[: self.count], norm="ortho") * math.sqrt(self.count)
+        return np.asarray(along + self._between_signal(found[self.count :]))
 
     def products(self, one: Array, other: Array) -> Array:
         """Mean products (cells, m, l) of signals of coefficients (m, k) and (l, k)."""
         return np.array([one[:, part] @ other[:, part].T for part in self._parts])
 
-    def power(self, coefficients: Array) -> Array:
+    def power(self, found: Array) -> Array:
         """Mean square (cells,) of a signal of coefficients (k,)."""
-        squares = coefficients**2
+        squares = found**2
         return np.array([squares[part].sum() for part in self._parts])
 
     def spread(self, values: Array) -> Array:

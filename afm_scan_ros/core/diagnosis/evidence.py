@@ -40,10 +40,10 @@ class Evidence:
     ``base`` (m, n) is the displacement (m) that one standard deviation of each free parameter of
     the base model adds. ``cells`` are those of the model's motion, and ``variance`` is that of a
     residual in them. ``weights`` (cells,) in 1/m² are those of least squares, by default for a
-    residual as expected. ``left`` (l,) are the coefficients between the harmonics of what the model
-    leaves there. No effect of the motion is sought in them: what repeats with changes is the
-    model's error first.
-    ``fitted`` (n,) are the samples of every other stretch.
+    residual as expected. ``between`` (l,) are the coefficients between the harmonics of what the
+    model leaves without disturbances. Only disturbances change them: what the motion changes there
+    is the model's error before it is an effect. ``fitted`` (n,) are the samples of every other
+    stretch.
     """
 
     playback: Playback
@@ -53,7 +53,7 @@ class Evidence:
     cells: RecordCells = field()
     variance: CellVariance = field()
     weights: Array = field()
-    left: Array = field(factory=lambda: np.empty(0))
+    between: Array = field(factory=lambda: np.empty(0))
     fitted: NDArray[np.bool_] = field(init=False)
 
     @base.default
@@ -67,7 +67,7 @@ class Evidence:
 
     @variance.default
     def _of_limit(self) -> CellVariance:
-        return CellVariance.of_motion(self.limit, self.tested)
+        return CellVariance.of_motion(self.limit, self.known_from)
 
     @weights.default
     def _expected(self) -> Array:
@@ -79,28 +79,29 @@ class Evidence:
         return np.asarray(np.arange(count) * STRETCHES // count % 2 == 0)
 
     @property
-    def tested(self) -> float:
+    def known_from(self) -> float:
         """Amplitudes from which the model's error is known."""
         return UNTESTED_FREEDOM if self.untested else KNOWN_FREEDOM
 
-    def parted(self, cells: RecordCells, chain: Chain) -> "Evidence":
+    def with_cells(self, cells: RecordCells, chain: Chain) -> "Evidence":
         """The same evidence by other cells, with the variance that a chain's residual tells."""
-        moved, left = self.playback.displacement(chain), self.residual(chain)
+        moved, residual = self.playback.displacement(chain), self.residual(chain)
         if self.still(chain):
-            variance = CellVariance.at_rest(self.limit, self.cells, moved, self.tested)
+            variance = CellVariance.at_rest(self.limit, self.cells, moved, self.known_from)
             return evolve(self, variance=variance, weights=variance.expected_weights)
         if cells.repetition is None:
             return self
-        variance = CellVariance.repeating(self.limit, cells, moved, left, self.tested)
-        between = cells.between((left + self._disturbance(chain))[np.newaxis])[0]
+        variance = CellVariance.repeating(self.limit, cells, moved, residual, self.known_from)
+        between = cells.between((residual + self._disturbance(chain))[np.newaxis])[0]
         weights = variance.expected_weights
-        return evolve(self, cells=cells, variance=variance, weights=weights, left=between)
+        return evolve(self, cells=cells, variance=variance, weights=weights, between=between)
 
-    def from_depolarised(self) -> "Evidence":
+    def from_depolarised(self, chain: Chain) -> "Evidence":
         """The same evidence with a depolarised scanner at the record's start."""
         if self.playback.initial_state.blank:
             return self
-        return evolve(self, playback=Playback(self.playback.view))
+        begun = evolve(self, playback=Playback(self.playback.view))
+        return begun.with_cells(self.cells, chain)
 
     def with_base(self, deviations: Array) -> "Evidence":
         """The same evidence under a base model whose free parameters deviate (m,)."""
@@ -123,13 +124,12 @@ class Evidence:
 
     def lasting_lines(self, chain: Chain) -> tuple[float, ...]:
         """Frequencies (Hz) of lasting lines between the harmonics of a motion, or at rest."""
-        cells, residual = self.cells, self.residual(chain)
-        if of := cells.repetition:
-            between = of.signals(of.between(residual[np.newaxis]), cells.count)[0]
-            residual = between[of.first : of.last]
+        of, residual = self.cells.repetition, self.residual(chain)
+        if of is not None:
+            residual = of.signal(of.between(residual[np.newaxis])[0])
         elif not self.still(chain):
             return ()
-        return lasting_lines(residual, cells.sample_period, of)
+        return lasting_lines(residual, self.cells.sample_period, of)
 
     def normalised_residual(self, chain: Chain) -> Array:
         """Residual (n,) with each band in units of its detection limit."""
@@ -139,11 +139,11 @@ class Evidence:
 
     def coefficients(self, chain: Chain) -> Array:
         """Coefficients (k,) of a chain's residual; between harmonics less disturbances alone."""
-        found = self.cells.coefficients(self.residual(chain)[np.newaxis])[0]
-        if len(self.left):
-            disturbed = self._disturbance(chain)[np.newaxis]
-            found[len(found) - len(self.left) :] = self.left - self.cells.between(disturbed)[0]
-        return np.asarray(found)
+        disturbed = self._disturbance(chain)
+        between = self.between
+        if disturbed.any():
+            between = between - self.cells.between(disturbed[np.newaxis])[0]
+        return self.cells.coefficients(self.residual(chain), between)
 
     def _disturbance(self, chain: Chain) -> Array:
         """Displacement (n,) in m by the disturbances of a chain, whatever it does besides."""
@@ -161,6 +161,10 @@ class Evidence:
     def whitened(self, coefficients: Array) -> Array:
         """Coefficients (k,), each times the root of its cell's weight."""
         return np.asarray(self.cells.spread(np.sqrt(self.weights)) * coefficients)
+
+    def whitened_along(self, coefficients: Array) -> Array:
+        """The same of those with the motion (n,), which are all that its effects change."""
+        return self.whitened(coefficients)[: self.cells.count]
 
     def on_fitted(self, coefficients: Array) -> Array:
         """The same as a signal (m,), on the stretches that a fit for the held-out ones sees."""
@@ -207,7 +211,7 @@ def _every_other(evidence: Evidence, chain: Chain) -> Evidence:
     base = evidence.base[:, : 2 * count : 2]
     limit, of = evidence.limit.sampled(period), evidence.cells.repetition
     cells = RecordCells(limit.edges, count, period, of and of.halved(count))
-    return Evidence(playback, limit, evidence.untested, base).parted(cells, chain)
+    return Evidence(playback, limit, evidence.untested, base).with_cells(cells, chain)
 
 
 def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:

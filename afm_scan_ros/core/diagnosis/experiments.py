@@ -250,7 +250,7 @@ def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tu
         for near in each.deviated
     ]
     of, formula = seen.variance, max(FORMULA_ERRORS) ** 2
-    all_moved = seen.cells.with_motion(np.array(moved + changed))
+    all_moved = seen.cells.along(np.array(moved + changed))
     return information(
         seen.cells.products(all_moved, all_moved),
         [len(each.deviated) for each in credible],

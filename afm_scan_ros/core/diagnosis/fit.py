@@ -18,8 +18,8 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 30
-TOLERANCE = 1e-4
-"""Relative change of cost or parameters that ends a fit; competing models differ by far more."""
+TOLERANCE = 1e-2
+"""Change of the cost in nats that ends a fit; competing models differ by far more."""
 CONFIDENT = 1.96
 ALL = slice(None)
 STEP_SHARES = (1.0, 0.2)
@@ -93,7 +93,7 @@ class Problem:
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._spans = self._layout.each("spans_decades") > 0.0
         self._last: tuple[Array, Array] | None = None
-        base = zip(*(each.cells.with_motion(each.base) for each in evidence), strict=True)
+        base = zip(*(each.cells.along(each.base) for each in evidence), strict=True)
         self._base = BaseRidge([self._joined(signals) for signals in base])
 
     def begin(
@@ -124,15 +124,18 @@ class Problem:
     def descend(self, start: Array) -> Fit | None:
         """Fit from a start; None where the forms cannot be applied on the way."""
         try:
+            begun = self._bounded(start)
+            cost = 0.5 * float(np.sum(self._excess(begun) ** 2))
             found = least_squares(
                 self._excess,
-                self._bounded(start),
+                begun,
                 jac=lambda values: self._jacobian(values, {}, None),
                 bounds=(self._lower, self._upper),
                 x_scale="jac",
                 max_nfev=ROUNDS,
-                ftol=TOLERANCE,
-                xtol=TOLERANCE,
+                ftol=TOLERANCE / max(cost, 1.0),  # of the cost, of which noise is nearly all
+                xtol=None,
+                gtol=None,
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None
@@ -183,7 +186,7 @@ class Problem:
         if self._last and np.array_equal(values, self._last[0]):
             return self._last[1]
         chain = inserted(self._chain, self._forms, self._layout.rows(values))
-        joined = self._joined([each.coefficients(chain) for each in self._evidence])
+        joined = self._joined(each.coefficients(chain) for each in self._evidence)
         self._last = values.copy(), self._base.left(joined)
         return self._last[1]
 

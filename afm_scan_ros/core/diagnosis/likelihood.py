@@ -277,7 +277,7 @@ class Likelihood:
     @cached_property
     def _influences(self) -> list[Array]:
         """Coefficients of the displacement by the free base parameters, of each record."""
-        return [each.cells.with_motion(each.base) for each in self.evidence]
+        return [each.cells.along(each.base) for each in self.evidence]
 
     @cached_property
     def _gram(self) -> Array:

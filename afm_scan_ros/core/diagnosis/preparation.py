@@ -127,7 +127,7 @@ def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 
         limit = limit.unprepared(len(view.measured) * view.sample_period)
     cells = RecordCells(limit.edges, len(view.drive), view.sample_period)
     cells = cells.repeating(view.drive, view.rates, _lines(observed))
-    return Evidence(playback, limit, untested).parted(cells, chain)
+    return Evidence(playback, limit, untested).with_cells(cells, chain)
 
 
 def _lines(observed: Record) -> tuple[int, int] | None:

@@ -27,7 +27,7 @@ class Repetition:
     settings: PartingSettings = PARTING
 
     @property
-    def slow(self) -> int:
+    def courses(self) -> int:
         """Cosines by which the part with the motion may change; 0 where the periods are few."""
         return min(self.settings.slow_courses, int(self.periods / self.settings.periods_each))
 
@@ -39,7 +39,7 @@ class Repetition:
     def between(self, signals: Array) -> Array:
         """Coefficients (m, k) of the part between the harmonics, of signals (m, n)."""
         found = self._changing(dct(signals[:, self.first : self.last], norm="ortho"))
-        found[:, : self.slower] = 0.0
+        found[:, : self.below] = 0.0
         return found
 
     def _changing(self, coefficients: Array) -> Array:
@@ -47,25 +47,25 @@ class Repetition:
         samples, length = self._period
         finer = np.zeros((len(coefficients), length))
         finer[:, : self.count] = coefficients
-        repeated = _slow_courses(idct(finer, norm="ortho"), samples, self.slow)
+        repeated = _slow_courses(idct(finer, norm="ortho"), samples, self.courses)
         return np.asarray(coefficients - dct(repeated, norm="ortho")[:, : self.count])
 
-    def signals(self, between: Array, count: int) -> Array:
-        """Signals (m, count) of the part between the harmonics, of its coefficients (m, k)."""
-        found = np.zeros((len(between), count))
-        found[:, self.first : self.last] = idct(between, norm="ortho")
-        return found
+    def signal(self, between: Array) -> Array:
+        """Signal (count,) of the part between the harmonics, of its coefficients (k,)."""
+        return np.asarray(idct(between, norm="ortho"))
 
     @property
-    def slower(self) -> int:
-        """Coefficients that are slower than half the rate of repetition."""
+    def below(self) -> int:
+        """Number of coefficients below half the rate of repetition."""
         return int(self.periods)
 
     def clear(self, periods: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Whether frequencies, in periods in all, are between the harmonics, by some ``margin``."""
         turns = periods / self.periods
         apart = np.minimum(np.abs(turns - np.round(turns)), turns - 0.5)
-        return np.asarray(apart * self.periods > 0.5 * self.slow + margin + self.settings.precision)
+        return np.asarray(
+            apart * self.periods > 0.5 * self.courses + margin + self.settings.precision
+        )
 
     def without_first(self) -> "Repetition":
         """Return that of all periods but the first."""
@@ -94,7 +94,7 @@ class Repetition:
     def share_between(self, moved: Array) -> float:
         """Share of the mean square of a motion (n,) that does not repeat."""
         seen = moved[np.newaxis, self.first : self.last]
-        if not self.slow or not np.ptp(seen):
+        if not self.courses or not np.ptp(seen):
             return 1.0
         power = np.sum(self._changing(dct(seen, norm="ortho")) ** 2)
         return float(power / np.var(seen) / self.count)

@@ -20,7 +20,6 @@ from scipy.stats import chi2
 
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import SMALLEST, DetectionLimit
-from afm_scan_ros.core.diagnosis.settings import PARTING
 from afm_scan_ros.core.diagnosis.tones import without_tones
 from afm_scan_ros.core.types import Array
 
@@ -61,9 +60,8 @@ class CellVariance:
     def of_noise(cls, noise: Array, error: Array, counts: Array, tested: float) -> "CellVariance":
         """Return that of noise of so many amplitudes, and an error (cells,) of few, both in m²."""
         freedom = satterthwaite(noise, error, counts, FREEDOM)
-        return cls(
-            noise + error, noise, freedom, satterthwaite(noise, error, KNOWN_FREEDOM, tested)
-        )
+        known = satterthwaite(noise, error, KNOWN_FREEDOM, tested)
+        return cls(noise + error, noise, freedom, known)
 
     @classmethod
     def at_rest(
@@ -71,12 +69,8 @@ class CellVariance:
     ) -> "CellVariance":
         """Return that of a record of little motion (n,), as whose error all of it counts."""
         noise, error = _parts(limit)
-        return cls.of_noise(
-            noise,
-            np.maximum(error, cells.power(cells.coefficients(moved[np.newaxis])[0])),
-            cells.counts,
-            tested,
-        )
+        most = np.maximum(error, cells.power(cells.coefficients(moved)))
+        return cls.of_noise(noise, most, cells.counts, tested)
 
     @classmethod
     def repeating(
@@ -87,25 +81,19 @@ class CellVariance:
         Between the harmonics lies as much of the discrepancy as of the motion, and at least what is
         seen there of a residual without its tones.
         """
-        both = cells.coefficients(moved[np.newaxis])[0]
-        along, between = cells.power(both).reshape(2, cells.bands)
         noise, error = _parts(limit)
-        counts, shares = (
-            cells.counts.reshape(2, cells.bands),
-            between / (along + between + SMALLEST**2),
-        )
-        noises = counts / counts.sum(axis=0) * noise
-        power, floor = between_power(cells, residual)
-        factor = PARTING.other_noise**2
-        seen = np.clip(floor, noises[1] / factor, noises[1] * factor)
-        leak = np.maximum(power - seen, shares * error)
-        with_motion, few = noises[0] + (1.0 - shares) * error, np.ones(cells.bands)
-        rest = cls.of_noise(seen, leak, counts[1], tested)
+        along, between = cells.power(cells.coefficients(moved)).reshape(2, cells.bands)
+        shares = between / (along + between + SMALLEST**2)
+        counts = cells.counts.reshape(2, cells.bands)
+        of_motion, of_rest = counts / counts.sum(axis=0) * noise
+        power, seen = between_power(cells, residual, of_rest)
+        rest = cls.of_noise(seen, np.maximum(power - seen, shares * error), counts[1], tested)
+        few = np.ones(cells.bands)
         return cls(
-            np.concatenate((with_motion, rest.total)),
-            np.concatenate((noises[0], rest.noise)),
-            np.concatenate((FREEDOM * few, rest.freedom)),
-            np.concatenate((tested * few, rest.known)),
+            np.append(of_motion + (1.0 - shares) * error, rest.total),
+            np.append(of_motion, rest.noise),
+            np.append(FREEDOM * few, rest.freedom),
+            np.append(tested * few, rest.known),
         )
 
     @property
@@ -139,17 +127,21 @@ def weights(power: Array, variance: Array, known: Array, freedom: Array) -> Arra
     return np.asarray(freedom * (freedom + known) / (known * variance + freedom * power))
 
 
-def between_power(cells: RecordCells, residual: Array) -> tuple[Array, Array]:
+def between_power(cells: RecordCells, residual: Array, noise: Array) -> tuple[Array, Array]:
     """Mean square (bands,) between the harmonics without its tones, and that of the noise alone.
 
-    Noise is told by the median of the squared coefficients, as a few larger ones leave it alone.
+    Noise is told by the median of the squared coefficients, as a few larger ones leave it alone,
+    within a factor of the ``noise`` (bands,) of the calibration.
     """
     if (of := cells.repetition) is None:
         raise ValueError("the motion does not repeat")
-    seen = of.signals(of.between(residual[np.newaxis]), cells.count)[0, of.first : of.last]
-    squares = dct(without_tones(seen, cells.sample_period, of), norm="ortho") ** 2 / cells.count
+    seen = of.signal(of.between(residual[np.newaxis])[0])
+    left = without_tones(seen, cells.sample_period, of)
+    squares = dct(left, norm="ortho") ** 2 / cells.count
     clear = of.clear(np.arange(of.count, dtype=np.float64) / 2.0)
     bands = [slice(*each) for each in pairwise(cells.firsts[1])]
     kept = [squares[band][clear[band]] for band in bands]
     medians = [np.median(few) / chi2.median(1) if len(few) else 0.0 for few in kept]
-    return np.array([squares[band].sum() for band in bands]), cells.counts[cells.bands :] * medians
+    most = of.settings.other_noise**2
+    floor = np.clip(cells.counts[cells.bands :] * medians, noise / most, noise * most)
+    return np.array([squares[band].sum() for band in bands]), floor

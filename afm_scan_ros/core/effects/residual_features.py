@@ -17,7 +17,7 @@ NEIGHBOURHOOD = 101  # lines
 MOST = 4
 
 DAMPINGS = (0.005, 0.02, 0.06)
-SPACING = 1.0
+SPACING = 0.8
 """Of the frequencies at which a mode is sought, in units of the resonance's damping."""
 REACH = 6.0
 """Half-widths of the resonance on either side of it that are evaluated."""

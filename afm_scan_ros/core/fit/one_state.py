@@ -24,17 +24,6 @@ from afm_scan_ros.core.fit.stretches import Edges, means
 from afm_scan_ros.core.types import Array
 
 
-def _at_knot() -> Array:
-    """Cubic B-splines at the knot between them, (3,)."""
-    return np.array([1.0, 4.0, 1.0]) / 6.0
-
-
-def _edges() -> tuple[tuple[int, slice, float], ...]:
-    """Table of a rise or a fall, splines at an edge of w, and the sign of a slope that leaves."""
-    lowest, highest = slice(3), slice(-3, None)
-    return (0, highest, 1.0), (0, lowest, -1.0), (1, lowest, 1.0), (1, highest, -1.0)
-
-
 @frozen(eq=False)
 class OneState:
     """Slopes over a drive from ``lower`` to ``upper`` and w between both ``widths``, V.
@@ -219,15 +208,23 @@ class OneState:
         would run away. Returns what ``Growth.lacking`` does.
         """
         tables, found, lacks = theta.reshape(self.shape), [], []
-        for table, edge, way in _edges():
-            beyond = way * tables[table][:, edge] @ _at_knot()
-            for row in np.flatnonzero(beyond > 0.0):
+        for table, splines in enumerate(self._leaving()):
+            beyond = tables[table] @ splines.T
+            for row, edge in np.argwhere(beyond > 0.0):
                 condition = np.zeros(self.shape)
-                condition[table, row, edge] = -way * _at_knot()
+                condition[table, row] = -splines[edge]
                 found.append(condition.ravel())
-                lacks.append(beyond[row])
+                lacks.append(beyond[row, edge])
         tolerance = self.settings.slope_tolerance
         return np.array(found).reshape(-1, theta.size) / tolerance, np.array(lacks) / tolerance
+
+    def _leaving(self) -> Array:
+        """Weights of the splines in how fast w leaves its lowest and its highest value.
+
+        Shape (2, 2, splines): while the drive rises and while it falls.
+        """
+        lowest, highest = self.across(np.array(self.widths))
+        return np.array([[-lowest, highest], [lowest, -highest]])
 
     def slopes(self, theta: Array, rest: Array) -> DuhemSlopes:
         """Return the effect's parameters, for w (V) at depolarised rest, (1,), where F is 0.
@@ -235,10 +232,12 @@ class OneState:
         Where a path would leave the cells, their outermost slopes end at the drive's.
         """
         tables = 1.0 + theta.reshape(self.shape)
-        for table, edge, way in _edges():
-            outer = tables[table][:, edge]
-            leaves = way * (outer @ _at_knot() - 1.0) > self.settings.slope_tolerance
-            outer[leaves] = 1.0 + way * np.minimum(way * (outer[leaves] - 1.0), 0.0)
+        for slopes, leaving in zip(tables, self._leaving(), strict=True):
+            for splines in leaving:
+                way, places = np.sign(splines.sum()), np.flatnonzero(splines)
+                rows = np.flatnonzero((slopes - 1.0) @ splines > self.settings.slope_tolerance)
+                outer = np.ix_(rows, places)
+                slopes[outer] = 1.0 + way * np.minimum(way * (slopes[outer] - 1.0), 0.0)
         rising, falling = tables
         slope = np.ones(self.settings.slope_cells_drive + 3)
         ends = self.lower, self.upper

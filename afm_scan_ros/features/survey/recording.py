@@ -206,7 +206,7 @@ def _step(
     ]
     view = evidence.playback.view
     left = view.measured - _played(evidence, chain, unknowns, here) + here @ np.array(moved)
-    rows = evidence.cells.with_motion(np.vstack((left, moved)))
+    rows = evidence.cells.along(np.vstack((left, moved)))
     products = evidence.cells.products(rows, rows)
     linear = LinearResidual(products[:, 0, 0], products[:, 1:, 0], products[:, 1:, 1:])
     there = linear.profiled(evidence.variance.weights)

@@ -115,7 +115,7 @@ def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_informati
 
     _, wide = free(1.0)
     of = seen.variance
-    moved = seen.cells.power(seen.cells.with_motion(wide.base[:1])[0])
+    moved = seen.cells.power(seen.cells.along(wide.base[:1])[0])
     told = float(of.weights(0.0 * of.total) @ moved)
     assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
     assert "gain_1" in free((0.011 / told) ** 0.5)[0]

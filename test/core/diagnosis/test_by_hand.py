@@ -32,7 +32,7 @@ def test_the_log_likelihood_is_that_of_the_cells(document: Document) -> None:
     none = document["likelihood"]["x"]["none"]
     ratio = np.array(none["cell_rms_m"]) ** 2 / variance
     by_hand = none["log_base"] - ((nu + known) / 2.0 * np.log1p(nu * ratio / known)).sum()
-    assert none["log_likelihood"] == pytest.approx(by_hand, rel=1e-4)
+    assert none["log_likelihood"] == pytest.approx(by_hand, abs=1e-2)
 
 
 def test_a_base_parameter_costs_its_prior_and_its_volume(document: Document) -> None:

@@ -109,7 +109,7 @@ def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatc
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
     beyond = [np.array(list(each.values())) - each["delay", ""] for each in (quick, slow)]
-    np.testing.assert_allclose(*beyond, rtol=0.2, atol=1.0)
+    np.testing.assert_allclose(*beyond, rtol=0.05, atol=1.0)
 
 
 def begun(bench: CandidateFitter) -> dict[tuple[str, str], float]:

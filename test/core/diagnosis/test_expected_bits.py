@@ -54,7 +54,7 @@ def predicted(seed: int, *counts: int) -> Array:
 
 def products_of(signals: Array) -> Array:
     cells = RecordCells(EDGES, signals.shape[1], PERIOD)
-    found = cells.coefficients(signals)
+    found = cells.along(signals)
     return cells.products(found, found)
 
 

@@ -20,8 +20,7 @@ EFFECTS = {
     "drift": Added("drift", "", (5e-6, 0.2)),
     "": None,
 }
-FAINT = 0.05
-"""A fit ends within half a nat, whatever the units."""
+FAINT = 1e-3
 CASES = [
     ("static_nonlinearity", Scale(0.01, 100.0, 0.01)),
     ("extra_resonance", Scale(20.0, 0.01, 100.0)),
