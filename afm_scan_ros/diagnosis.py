@@ -187,6 +187,7 @@ def diagnose(
     longest: float = LONGEST,
     *,
     parallel: bool = True,
+    structure: bool = False,
 ) -> Diagnosis:
     """Find the effects that explain the residual of a model in records.
 
@@ -210,6 +211,11 @@ def diagnose(
     parallel
         Diagnose the axes at the same time, in threads. In turn, they take less time of the cores,
         and longer. Coupled axes are diagnosed together.
+    structure
+        Whether to ask what the structure of the model lacks, and not what has changed since it was
+        identified. Its stated error then explains no residual, and gain, frequency and damping of
+        its first resonance are fitted anew beside each effect. An effect is named only where hardly
+        anything is left beside it.
 
     Returns
     -------
@@ -254,7 +260,9 @@ def diagnose(
     refuse_same((*given, *well))
     progress = progress or (lambda _: None)
     try:
-        found = diagnose_scanner(scanner, given, progress, well, longest, parallel=parallel)
+        found = diagnose_scanner(
+            scanner, given, progress, well, longest, parallel=parallel, structure=structure
+        )
     except InputError as error:
         raise InputError(f"{model.origin}: {error}") from error
     extended = Model(found.model, f"{model.origin}, extended by a diagnosis")

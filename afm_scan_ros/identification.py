@@ -61,6 +61,7 @@ def identify(
     *,
     effects: Iterable[str] = (),
     states: int | None = None,
+    linear: bool = False,
 ) -> Model:
     """Identify every axis from whatever records there are of it, of any number and kinds.
 
@@ -76,6 +77,9 @@ def identify(
         identified with the vibration, best from records of several amplitudes.
     states
         Number of states of the vibration of coupled axes; None chooses it by records held out.
+    linear
+        Whether the scanner has no hysteresis, as one of flexures that a voice coil or an
+        electrostatic comb drives: its vibration and creep alone are fitted.
 
     Returns
     -------
@@ -121,7 +125,7 @@ def identify(
     if several or effects or states is not None or of_coupled_axes(given):
         return identify_coupled_axes(given, effects, states, report)
     taken = [_whole(record) for record in named(given)]
-    found = identify_records(taken, report)
+    found = identify_records(taken, report, linear=linear)
     names = ", ".join(each.name for each in taken)
     return Model(found.model, f"identified from {names}", found)
 

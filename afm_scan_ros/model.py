@@ -23,6 +23,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import SHARE, extended
+from afm_scan_ros.core.intersample import HELD, finer, voltages_of
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction_error import standard_deviation
@@ -131,6 +132,7 @@ class Model:
         beyond: str | float = ...,
         return_std: Literal[False] = ...,
         periodic: bool = ...,
+        intersample: str = ...,
     ) -> Array: ...
 
     @overload
@@ -142,6 +144,7 @@ class Model:
         beyond: str | float = ...,
         return_std: Literal[True],
         periodic: bool = ...,
+        intersample: str = ...,
     ) -> tuple[Array, Array]: ...
 
     def predict(
@@ -152,6 +155,7 @@ class Model:
         beyond: str | float = "refuse",
         return_std: bool = False,
         periodic: bool = False,
+        intersample: str = HELD,
     ) -> Array | tuple[Array, Array]:
         """Return the displacement (m) for a drive (V), from depolarised rest at zero.
 
@@ -169,6 +173,8 @@ class Model:
             Whether to return the standard deviation of the prediction too.
         periodic
             Of coupled axes, whether the drive holds whole periods, in steady state.
+        intersample
+            How the drive runs between its samples, as of ``Record``: "held" or "band_limited".
 
         Returns
         -------
@@ -211,20 +217,21 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
-        model = extended(self.scanner, given, share) if share else self.scanner
+        voltages, every = voltages_of(given, intersample), finer(intersample)
+        model = extended(self.scanner, voltages, share) if share else self.scanner
         try:
-            moved = predict(model, given)
+            fine = predict(model, voltages)
         except BeyondRangeError as error:
             farther = f", of which {share:.0%} more may be predicted" if share else ""
             raise InputError(
-                f"drive is {error.value:.4g} V at sample {error.sample}, and the model was"
+                f"drive is {error.value:.4g} V at sample {error.sample // every}, and the model was"
                 f" identified to {error.limit:.4g} V{farther}: give a smaller drive"
             ) from None
+        moved = Trace(0, given.sample_period, fine.x[::every], fine.y[::every])
         if not return_std:
             return self._like(drive, moved)
-        return self._like(drive, moved), self._like(
-            drive, standard_deviation(self.scanner, given, moved, share or SHARE)
-        )
+        deviation = standard_deviation(self.scanner, given, moved, share or SHARE, intersample)
+        return self._like(drive, moved), self._like(drive, deviation)
 
     def invert(
         self,

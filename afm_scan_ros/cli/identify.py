@@ -54,9 +54,9 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     help="States of the vibration of coupled axes. By default held-out records choose them.",
 )
 @click.option(
-    "--depolarised",
+    "--linear",
     is_flag=True,
-    help="Every RECORD begins depolarised. By default its initial hysteresis state is estimated.",
+    help="The scanner has no hysteresis: fit its vibration and creep alone.",
 )
 @click.option(
     "--out",
@@ -73,7 +73,7 @@ def identify(
     out: Path,
     tables: TableOptions,
     *,
-    depolarised: bool,
+    linear: bool,
     **bags: Path | None,
 ) -> None:
     """Identify a model from RECORDs of any kinds, and report how well it fits.
@@ -83,13 +83,11 @@ def identify(
     written = (out.suffix, ".npz", ".fit.json", ".fit.html")
     refuse_existing(*map(out.with_suffix, written), other="file")
     given = [tables.read(path) for path in records]
-    if depolarised:
-        given = [evolve(record, start="depolarised") for record in given]
     given += [evolve(tables.read(bag), kind=kind) for kind, bag in bags.items() if bag]
     if not given:
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
-        model = api.identify(given, progress, effects=effects, states=states)
+        model = api.identify(given, progress, effects=effects, states=states, linear=linear)
     if model.is_coupled:
         _write_coupled(model, out)
         return

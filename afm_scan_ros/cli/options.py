@@ -13,13 +13,14 @@ from types import MappingProxyType
 from typing import Any
 
 import click
-from attrs import frozen
+from attrs import evolve, frozen
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from afm_scan_ros.bag.reader import TYPES
 from afm_scan_ros.bag.record import is_table, read_record
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.intersample import HELD, INTERSAMPLE
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.files import share_directory
@@ -179,12 +180,18 @@ def in_lines(
 
 @frozen
 class TableOptions:
-    """What files do not state: columns, sample rate in Hz, lines above the rows; a bag's topics."""
+    """What files do not state.
+
+    Of tables these are the columns, the sample rate in Hz and the lines above the rows, of bags the
+    topics; of both how the record begins, and how its drive runs between samples.
+    """
 
     columns: str | None = None
     sample_rate: float | None = None
     skip_rows: int = 0
     topics: Mapping[str, str] = MappingProxyType({})
+    depolarised: bool = False
+    intersample: str = HELD
 
     @property
     def parsed(self) -> tuple[Column, ...] | None:
@@ -193,6 +200,11 @@ class TableOptions:
 
     def read(self, path: Path) -> Record:
         """Read a record."""
+        found = self._read(path)
+        start = "depolarised" if self.depolarised else found.start
+        return evolve(found, start=start, intersample=self.intersample)
+
+    def _read(self, path: Path) -> Record:
         if not is_table(path):
             return read_record(path, topics=self.topics)
         if self.topics:
@@ -244,5 +256,20 @@ topic_option = click.option(
 )
 table_options = grouped("tables", TableOptions, *TABLE)
 """What tables do not state."""
-record_options = grouped("tables", TableOptions, *TABLE, topic_option)
+START = (
+    click.option(
+        "--depolarised",
+        is_flag=True,
+        help="Records begin depolarised. By default their initial hysteresis state is estimated.",
+    ),
+    click.option(
+        "--intersample",
+        type=click.Choice(INTERSAMPLE),
+        default=HELD,
+        show_default=True,
+        help="How drives run between their samples: held by a converter, or band-limited where they"
+        " were measured behind an anti-aliasing filter.",
+    ),
+)
+record_options = grouped("tables", TableOptions, *TABLE, topic_option, *START)
 """What tables and bags do not state."""

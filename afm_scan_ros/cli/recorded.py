@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from attrs import evolve
 
 from afm_scan_ros import diagnosis as api
 from afm_scan_ros.bag.reader import read_scan
@@ -121,9 +120,10 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
     help="Length of the proposed experiment, at most.",
 )
 @click.option(
-    "--depolarised",
+    "--structure",
     is_flag=True,
-    help="Every BAG begins depolarised. By default its initial hysteresis state is estimated.",
+    help="Ask what the structure of the model lacks, and not what has changed since it was"
+    " identified: its stated error then explains nothing.",
 )
 @record_options
 def diagnose(
@@ -134,7 +134,7 @@ def diagnose(
     longest: float,
     tables: TableOptions,
     *,
-    depolarised: bool,
+    structure: bool,
 ) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
@@ -144,10 +144,8 @@ def diagnose(
     refuse_existing(out / "diagnosis.json")
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
-    if depolarised:
-        records = [evolve(record, start="depolarised") for record in records]
     with working("diagnosing") as progress:
-        found = api.diagnose(base, records, well, progress, longest)
+        found = api.diagnose(base, records, well, progress, longest, structure=structure)
         progress("describing the residual")
         found.save(out)
     for record in (*records, *well):

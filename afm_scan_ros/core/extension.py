@@ -12,7 +12,9 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
+from afm_scan_ros.core.intersample import HELD, voltages_of
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.settings import setting
 from afm_scan_ros.core.types import Array, Trace
 
@@ -50,6 +52,13 @@ def extended_axis(model: AxisModel, drive: Array, share: float = SHARE) -> AxisM
     if _within(drive, lower, upper) or not _within(drive, lowest, highest):
         return model
     return evolve(model, hysteresis=evolve(model.hysteresis, forward=_wider(forward, share)))
+
+
+def with_overshoot(model: ScannerModel, record: Record) -> ScannerModel:
+    """Return a model that holds what a record's band-limited drive overshoots between samples."""
+    if record.intersample == HELD:
+        return model
+    return extended(model, voltages_of(record.traces()[0], record.intersample))
 
 
 def _farther(lower: float, upper: float, share: float) -> tuple[float, float]:

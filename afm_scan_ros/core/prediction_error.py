@@ -1,5 +1,7 @@
 """How well a model predicts a motion: by its parameters, and by its error on its records."""
 
+from functools import partial
+
 import numpy as np
 from attrs import evolve
 
@@ -8,6 +10,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import SHARE, extended_axis, unknown_beyond
+from afm_scan_ros.core.intersample import HELD, held_voltages, moved_by
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread, Variant
@@ -15,7 +18,7 @@ from afm_scan_ros.core.types import Array, Trace
 
 
 def standard_deviation(
-    model: ScannerModel, drive: Trace, moved: Trace, share: float = SHARE
+    model: ScannerModel, drive: Trace, moved: Trace, share: float = SHARE, intersample: str = HELD
 ) -> Trace:
     """Standard deviation (m) of a motion predicted for a drive (V), without the sensor's noise.
 
@@ -23,10 +26,9 @@ def standard_deviation(
     ``Spread`` it is the rms error of the whole motion. Raises InputError where an axis states no
     error.
     """
+    given = drive.sample_period, share, intersample
     found = {
-        name: _of_axis(
-            model, name, getattr(drive, name), getattr(moved, name), drive.sample_period, share
-        )
+        name: _of_axis(model, name, drive.axis(name), moved.axis(name), *given)
         for name in model.axes
     }
     still = np.zeros_like(moved.x)
@@ -34,30 +36,39 @@ def standard_deviation(
 
 
 def _of_axis(
-    model: ScannerModel, name: str, drive: Array, moved: Array, sample_period: float, share: float
+    model: ScannerModel,
+    name: str,
+    drive: Array,
+    moved: Array,
+    sample_period: float,
+    share: float,
+    intersample: str,
 ) -> Array:
     axis = model.axis(name)
     beyond = unknown_beyond(axis, drive, share)
     if axis.spread is None:
         return np.asarray(np.hypot(_of_records(axis, name, moved, sample_period), beyond))
-    known = np.sum(apart(axis, axis.spread, drive, sample_period, share) ** 2, axis=0)
+    known = np.sum(apart(axis, axis.spread, drive, sample_period, share, intersample) ** 2, axis=0)
     left = discrepancy(axis.spread, moved, sample_period)
     return np.asarray(np.sqrt(known + left**2 + beyond**2))
 
 
 def apart(
-    axis: AxisModel, spread: Spread, drive: Array, sample_period: float, share: float = SHARE
+    axis: AxisModel,
+    spread: Spread,
+    drive: Array,
+    sample_period: float,
+    share: float = SHARE,
+    intersample: str = HELD,
 ) -> Array:
     """What a standard deviation in each direction adds to a prediction (m), (directions, n).
 
     Effects that were added to the axis are left out: they change it by far less than it is.
     """
-    middle = _moved(axis, spread.centre, drive, sample_period, share)
+    given = drive, sample_period, share, intersample
+    middle = _moved(axis, spread.centre, *given)
     return np.array(
-        [
-            (_moved(axis, one, drive, sample_period, share) - middle) / one.deviations
-            for one in spread.directions
-        ]
+        [(_moved(axis, one, *given) - middle) / one.deviations for one in spread.directions]
     ).reshape(-1, len(drive))
 
 
@@ -67,7 +78,12 @@ def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:
 
 
 def _moved(
-    axis: AxisModel, variant: Variant, drive: Array, sample_period: float, share: float
+    axis: AxisModel,
+    variant: Variant,
+    drive: Array,
+    sample_period: float,
+    share: float,
+    intersample: str,
 ) -> Array:
     other = evolve(
         axis,
@@ -77,8 +93,8 @@ def _moved(
         sensor=variant.sensor,
         added=(),
     )
-    cascade = forward(extended_axis(other, drive, share), sample_period)
-    return cascade.apply(cascade.at_rest(), drive)[1]
+    wider = extended_axis(other, held_voltages(drive, intersample), share)
+    return moved_by(partial(forward, wider), drive, sample_period, intersample)
 
 
 def _of_records(axis: AxisModel, name: str, moved: Array, sample_period: float) -> float:

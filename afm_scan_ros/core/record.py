@@ -17,6 +17,7 @@ from afm_scan_ros.core.arguments import (
 )
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
+from afm_scan_ros.core.intersample import HELD, finer
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace, by_value, channels_of, trace_of
@@ -60,6 +61,10 @@ class Record:
     start
         "depolarised" where the scanner's hysteresis is known to begin so; "unknown" has
         ``diagnose`` estimate its initial state.
+    intersample
+        How the drive runs between its samples: "held" by a converter, which is so of every drive
+        that was commanded, or "band_limited", of one that was measured behind an anti-aliasing
+        filter.
     name
         What messages and reports call it.
     scan
@@ -74,7 +79,7 @@ class Record:
     ------
     InputError
         For shapes that do not pair, for what is not finite, a sample period that is not positive,
-        an axis given twice, and an unknown kind or start.
+        an axis given twice, and an unknown kind, start or intersample behaviour.
 
     Notes
     -----
@@ -98,6 +103,7 @@ class Record:
     axes: tuple[str, ...] = field(default=("x",), converter=axes_of)
     kind: str | None = None
     start: str = "unknown"
+    intersample: str = field(default=HELD, kw_only=True)
     name: str = field(default="", kw_only=True)
     scan: ScanSpec | None = field(default=None, kw_only=True)
     shortcomings: tuple[str, ...] = field(default=(), kw_only=True)
@@ -114,6 +120,7 @@ class Record:
             raise InputError(f"kind {self.kind!r} is unknown: give one of {', '.join(KINDS)}")
         if self.start not in STARTS:
             raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
+        finer(self.intersample)
         if self.scan is not None:
             of_type(ScanSpec, "scan", self.scan, SPEC)
 

@@ -11,10 +11,10 @@ import numpy as np
 from afm_scan_ros.core.closed_loop import FIRST, Round
 from afm_scan_ros.core.comparison import ScanComparison, rms_of
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
+from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.experiments import Proposal
-from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.residual_report import Description, ResidualReport, report_residual
 from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, joined
 from afm_scan_ros.core.diagnosis.search import Selection
@@ -167,20 +167,20 @@ def _cells(evidence: Evidence) -> Document:
 
 def _likelihood(found: Selection) -> Document:
     """Return the log likelihood of each set's best trial, and its log probability; in nats."""
-    fits = {(): found.without, **{names: t.cells for names, t in found.posterior.best.items()}}
+    fits = {(): found.without, **found.posterior.best}
     return {
         joined(names): {**_fit(fits.get(names)), "log_probability": log}
         for names, log in found.posterior.logs.items()
     }
 
 
-def _fit(found: CellFit | None) -> Document:
+def _fit(found: FittedCandidates | None) -> Document:
     if found is None:
         return dict.fromkeys(("log_likelihood", "log_base", "cell_rms_m"))
     return {
-        "log_likelihood": found.log_likelihood,
-        "log_base": found.log_base,
-        "cell_rms_m": np.sqrt(found.power).tolist(),
+        "log_likelihood": found.cells.log_likelihood,
+        "log_base": found.cells.log_base,
+        "cell_rms_m": np.sqrt(found.cells.power).tolist(),
     }
 
 

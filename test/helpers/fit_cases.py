@@ -120,9 +120,8 @@ def record(operator: Operator, drive: Array, tone: float = 0.0) -> afm.Record:
 
 
 def signals(drive: Array, moved: Array, block: int) -> Signals:
-    found = signals_of(
-        "a", drive, moved, PERIOD, depolarised=True, half_range=LIMIT, settings=SETTINGS
-    )
+    given = afm.Record(drive, moved, PERIOD, start="depolarised", name="a")
+    found = signals_of(given, drive, LIMIT, SETTINGS)
     return evolve(found, block=block, edges=block * np.arange(len(drive) // block + 1))
 
 

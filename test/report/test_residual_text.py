@@ -26,6 +26,7 @@ from afm_scan_ros.report.residual import (
     residual_text,
 )
 from helpers.in_process import ALL, default_model, scan
+from helpers.posteriors import no_effect
 
 SPEC = ScanSpec(lines=4, samples_per_line=2000)
 
@@ -49,7 +50,7 @@ def trace_of(records: Sequence[Record]) -> AxisDiagnosis:
     """Axis x of several records, with nothing kept."""
     evidence = tuple(evidence_of("x", default_model(), each, i) for i, each in enumerate(records))
     chain = chain_of(default_model().x)
-    without = Likelihood(evidence, chain).fit(chain)
+    without = no_effect(Likelihood(evidence, chain).fit(chain))
     none = Selection(without, (), Posterior.of(without, ()))
     return AxisDiagnosis("x", evidence, chain, chain, chain, none, ())
 

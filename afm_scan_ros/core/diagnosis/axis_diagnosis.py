@@ -10,6 +10,7 @@ unless another record shows it whose drive does not repeat at this rate.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import zip_longest
 
 import numpy as np
@@ -24,6 +25,7 @@ from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
 from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.structure import REFIT
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
@@ -222,28 +224,37 @@ class AxisDiagnosis:
 
 
 def diagnose_axis(
-    axis: str, model: ScannerModel, observations: Sequence[Record], progress: ProgressCallback
+    axis: str,
+    model: ScannerModel,
+    observations: Sequence[Record],
+    progress: ProgressCallback,
+    *,
+    structure: bool = False,
 ) -> AxisDiagnosis:
     """Find the effects that the model of one axis lacks, from the residuals of the records.
 
-    An effect may be taken for an initial state of the hysteresis. Where records seem to begin in
-    such a state and something is lacking, they are also taken to begin depolarised.
+    Where its ``structure`` is traced, the model is one that counts as exact. An effect may be taken
+    for an initial state of the hysteresis. Where records seem to begin in such a state and
+    something is lacking, they are also taken to begin depolarised.
     Raises InputError where the model states no model discrepancy.
     """
     chain = chain_of(model.axis(axis))
     given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
-    free, evidence = with_base_parameters(given, chain)
+    free, evidence = ((), tuple(given)) if structure else with_base_parameters(given, chain)
+    search = partial(_search, chain=chain, progress=progress, beside=(REFIT,) if structure else ())
     fresh = tuple(each.from_depolarised(chain) for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
-        return _diagnosed(axis, _search(evidence, chain, progress), free)
-    searches = [_search(each, chain, progress) for each in (evidence, fresh)]
-    return _diagnosed(axis, _likelier(searches), free)
+        return _diagnosed(axis, search(evidence), free)
+    return _diagnosed(axis, _likelier([search(each) for each in (evidence, fresh)]), free)
 
 
 def _search(
-    evidence: tuple[Evidence, ...], chain: Chain, progress: ProgressCallback
+    evidence: tuple[Evidence, ...],
+    chain: Chain,
+    progress: ProgressCallback,
+    beside: tuple[EffectForm, ...],
 ) -> ModelSearch:
-    fitter = CandidateFitter(evidence, chain)
+    fitter = CandidateFitter(evidence, chain, beside)
     return ModelSearch(
         fitter, lambda c: features_of(fitter.decimated_evidence, evidence, c), progress
     )
@@ -251,7 +262,7 @@ def _search(
 
 def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
     """Return the search of the likelier initial state, once single effects are fitted."""
-    if searches[0].selection.without.adequate:
+    if searches[0].selection.without.cells.adequate:
         return searches[0]
     for each in searches:
         each.grow()

@@ -43,11 +43,20 @@ CANDIDATES = tuple(
 
 @frozen(eq=False)
 class FittedCandidates:
-    """Candidates fitted together, and what they leave in the cells of all records."""
+    """Candidates fitted together, and what they leave in the cells of all records.
+
+    The forms ``beside`` them belong to every hypothesis, and their values come first.
+    """
 
     candidates: tuple[Candidate, ...]
     fit: Fit
     cells: CellFit
+    beside: tuple[EffectForm, ...] = ()
+
+    @property
+    def forms(self) -> tuple[EffectForm, ...]:
+        """All forms, in the order in which they are inserted."""
+        return (*self.beside, *(candidate.form for candidate in self.candidates))
 
     @property
     def log_posterior(self) -> float:
@@ -63,26 +72,31 @@ class FittedCandidates:
     @property
     def at_end(self) -> bool:
         """Whether a value is at an end of its range, where the effect is not as the catalogue's."""
-        each = [p for candidate in self.candidates for p in candidate.form.parameters]
+        each = [p for form in self.forms for p in form.parameters]
         numbers = zip(each, self.fit.values, self.fit.halfwidth, strict=True)
         return any(parameter.at_end(value, half) for parameter, value, half in numbers)
 
     def part(self, place: int) -> slice:
         """Where the parameters of one of the candidates stand among those of all."""
-        first = sum(len(c.form.parameters) for c in self.candidates[:place])
-        return slice(first, first + len(self.candidates[place].form.parameters))
+        forms, at = self.forms, len(self.beside) + place
+        first = sum(len(form.parameters) for form in forms[:at])
+        return slice(first, first + len(forms[at].parameters))
 
     def extended(self, chain: Chain) -> Chain:
         """Chain with the candidates at the fitted values."""
-        return inserted(chain, [c.form for c in self.candidates], self.fit.rows)
+        return inserted(chain, self.forms, self.fit.rows)
+
+    def base(self, chain: Chain) -> Chain:
+        """Chain with the forms beside the candidates alone."""
+        return inserted(chain, self.beside, self.fit.rows)
 
     def deviated(self, chain: Chain, share: float) -> Iterator[Chain]:
         """Yield the chain for a further record at a ``share`` of each deviation of the values.
 
         Values stay within their ranges: of both directions, the one with more room is taken.
         """
-        forms = [c.form for c in self.candidates]
-        values, each = self.fit.values, [p for form in forms for p in form.parameters]
+        forms, values = self.forms, self.fit.values
+        each = [p for form in forms for p in form.parameters]
         lower, upper = (np.array([getattr(p, end) for p in each]) for end in ("lower", "upper"))
         for deviation in share * self.fit.deviations:
             ends = [np.clip(values + step, lower, upper) for step in (deviation, -deviation)]
@@ -92,7 +106,8 @@ class FittedCandidates:
 
     def without(self, chain: Chain, place: int) -> Chain:
         """Chain with all candidates but one, at the values of the joint fit."""
-        forms = [c.form for i, c in enumerate(self.candidates) if i != place]
+        at = len(self.beside) + place
+        forms = [form for i, form in enumerate(self.forms) if i != at]
         return inserted(chain, forms, np.delete(self.fit.rows, self.part(place), axis=1))
 
 
@@ -108,14 +123,27 @@ class InitialFit:
 class CandidateFitter:
     """Fits candidates to the records of one axis, each inserted into a chain.
 
-    Starting values come from ``decimated_evidence``. Fits and scores use the full records.
+    Starting values come from ``decimated_evidence``. Fits and scores use the full records. Some
+    forms are fitted ``beside`` them, and where there are no candidates.
     """
 
-    def __init__(self, evidence: Sequence[Evidence], chain: Chain) -> None:
-        self.evidence = tuple(evidence)
-        self.chain = chain
+    def __init__(
+        self, evidence: Sequence[Evidence], chain: Chain, beside: Sequence[EffectForm] = ()
+    ) -> None:
+        self.evidence, self.chain, self.beside = tuple(evidence), chain, tuple(beside)
         self.likelihood = Likelihood(self.evidence, chain)
         self._own: tuple[FittedCandidates | None, tuple[Array, ...]] = None, ()
+        self.without = self._fitted_without()
+        if self.beside:
+            self.likelihood = Likelihood(self.evidence, self.without.extended(chain))
+
+    def _fitted_without(self) -> FittedCandidates:
+        """Fit the forms beside the candidates alone."""
+        neutral = np.concatenate([np.empty(0), *(form.neutral for form in self.beside)])
+        rows = np.tile(neutral, (len(self.evidence), 1))
+        found = self._fitted((), rows) if self.beside else None
+        cells = self.likelihood.fit(self.chain)
+        return found or FittedCandidates((), Fit(rows, np.zeros_like(neutral)), cells, self.beside)
 
     @cached_property
     def decimated_evidence(self) -> tuple[Evidence, ...]:
@@ -133,7 +161,7 @@ class CandidateFitter:
             return None
         candidate = candidate.at(scale_of(self.chain.model))
         candidates = (*(selected.candidates if selected else ()), candidate)
-        before = selected.fit.rows if selected else np.empty((len(self.evidence), 0))
+        before = (selected or self.without).fit.rows
         equivalent = (np.tile(s, (len(before), 1)) for s in candidate.form.starts(features))
         starts = (np.hstack((before, start)) for start in equivalent)
         found = self._decimated_problem(candidates).begin(
@@ -166,10 +194,10 @@ class CandidateFitter:
         Order matters: an effect acts on the chain with the effects inserted before it.
         """
         *others, last = selected.candidates
-        *values, of_last = np.split(selected.fit.rows, self._ends(selected), axis=1)
+        first, *values, of_last = np.split(selected.fit.rows, self._begins(selected), axis=1)
         for place in range(len(others)):
             candidates = (*others[:place], last, *others[place:])
-            rows = np.hstack((*values[:place], of_last, *values[place:]))
+            rows = np.hstack((first, *values[:place], of_last, *values[place:]))
             if trial := self._fitted(candidates, rows):
                 yield trial
 
@@ -179,9 +207,9 @@ class CandidateFitter:
         return not any(each.playback.view.other.any() for each in self.evidence)
 
     @staticmethod
-    def _ends(selected: FittedCandidates) -> list[int]:
-        """Where the values of each candidate but the last end."""
-        return [selected.part(place).stop for place in range(len(selected.candidates) - 1)]
+    def _begins(selected: FittedCandidates) -> list[int]:
+        """Where the values of each candidate begin."""
+        return [selected.part(place).start for place in range(len(selected.candidates))]
 
     def _selected_influence(self, selected: FittedCandidates | None) -> tuple[Array, ...]:
         """Influence of the selected candidates, computed once for all candidates beside them."""
@@ -195,10 +223,13 @@ class CandidateFitter:
         return self._own[1] if selected else ()
 
     def _decimated_problem(self, candidates: Sequence[Candidate]) -> Problem:
-        return Problem(self.decimated_evidence, self.chain, [c.form for c in candidates])
+        return Problem(self.decimated_evidence, self.chain, self._forms(candidates))
+
+    def _forms(self, candidates: Sequence[Candidate]) -> list[EffectForm]:
+        return [*self.beside, *(candidate.form for candidate in candidates)]
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
-        forms = [candidate.form for candidate in candidates]
+        forms = self._forms(candidates)
         evidence: Sequence[Evidence] = self.evidence
         disturbed = any(p.located for form in forms for p in form.parameters)
         seen = Evidence.whitened if disturbed else Evidence.whitened_along
@@ -209,12 +240,12 @@ class CandidateFitter:
                 return None
             cells = self.likelihood.fit(inserted(self.chain, forms, found.rows))
             evidence, rows = self.likelihood.reweighted(cells), found.rows
-            trial = FittedCandidates(candidates, found, cells)
+            trial = FittedCandidates(candidates, found, cells, self.beside)
         return trial
 
     def on_fitted_stretches(self, selected: FittedCandidates) -> Chain:
         """Chain with the values fitted to every other stretch; those of all where that fails."""
-        forms = [candidate.form for candidate in selected.candidates]
+        forms = selected.forms
         evidence = self.likelihood.reweighted(selected.cells)
         found = Problem(evidence, self.chain, forms, Evidence.on_fitted).descend(selected.fit.rows)
         return inserted(self.chain, forms, found.rows) if found else selected.extended(self.chain)

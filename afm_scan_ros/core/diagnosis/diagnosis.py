@@ -37,8 +37,10 @@ from afm_scan_ros.core.diagnosis.result import (
     effects,
     joined,
 )
+from afm_scan_ros.core.diagnosis.structure import counted_exact
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.extension import with_overshoot
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
@@ -119,11 +121,13 @@ def diagnose(
     longest: float = LONGEST,
     *,
     parallel: bool = True,
+    structure: bool = False,
 ) -> ScannerDiagnosis:
     """Diagnose every axis that the model and all records have, in threads if ``parallel``.
 
     Records of the ``healthy`` scanner tell the model's error. ``progress`` is called with the axis
     and the candidate that is being fitted. A proposed experiment lasts at most ``longest`` s.
+    What the ``structure`` of the model lacks is traced where asked for: see structure.py.
     Raises InputError where no record or no common axis is given, or where the model states no model
     discrepancy.
     """
@@ -131,8 +135,13 @@ def diagnose(
         raise InputError("no record is given: give one bag or more")
     unlike = tuple(unlike_healthy(model, healthy))
     model = with_healthy(model, healthy)
+    believed = counted_exact(model) if structure else model
+    for observed in observations:
+        believed = with_overshoot(believed, observed)
     by_axis = (in_parallel if parallel else _in_turn)(
-        lambda name: diagnose_axis(name, model, observations, _on_axis(name, progress)),
+        lambda name: diagnose_axis(
+            name, believed, observations, _on_axis(name, progress), structure=structure
+        ),
         _axes_of_all(model, observations),
     )
     verdict = max((diagnosed.verdict for diagnosed in by_axis.values()), key=SEVERITY.index)
@@ -182,7 +191,8 @@ def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
         Added(c.effect.name, c.form.kind, tuple(selected.fit.values[selected.part(place)]))
         for place, c in enumerate(selected.candidates)
     )
-    return evolve(axis, added=(*axis.added, *added))
+    found = selected.base(diagnosed.chain).model
+    return evolve(axis, vibration=found.vibration, added=(*axis.added, *added))
 
 
 def _proposals(

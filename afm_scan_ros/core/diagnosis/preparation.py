@@ -76,8 +76,7 @@ def _opening(view: AxisSignals) -> AxisSignals:
     """Return the first part of a record: 1.5 times as long as to its second drive extreme."""
     last = max(int(view.drive.argmin()), int(view.drive.argmax()))
     count = min(len(view.drive), max(FEWEST_SAMPLES, 3 * last // 2))
-    drive, measured, other = (s[:count] for s in (view.drive, view.measured, view.other))
-    return evolve(view, drive=drive, measured=measured, other=other)
+    return view.part(count)
 
 
 def _candidate_states(limits: tuple[float, float], rest: float) -> Iterator[InitialState]:
@@ -152,7 +151,8 @@ def _other(axis: str, model: ScannerModel, observed: Record) -> Array:
 def _axis_signals(observed: Record, axis: str, other: Array) -> AxisSignals:
     drive, measured = (signal[: len(other)] for signal in observed.signals(axis))
     rates = repetition_rates(observed)
-    return AxisSignals(observed.name, observed.sample_period, drive, measured, other, rates=rates)
+    given = observed.name, observed.sample_period, drive, measured, other
+    return AxisSignals(*given, rates=rates, intersample=observed.intersample)
 
 
 def _playback(

@@ -8,11 +8,12 @@ rest.
 """
 
 import numpy as np
-from attrs import define, field, frozen
+from attrs import define, evolve, field, frozen
 
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
+from afm_scan_ros.core.intersample import HELD, finer, held_voltages, read_between
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, floats
 
@@ -33,7 +34,8 @@ class AxisSignals:
 
     ``other`` is the other axis' own displacement, as the model predicts it. ``number`` is the place
     of the record among those diagnosed together. ``rates`` (Hz) are those at which the motion of
-    either axis repeats.
+    either axis repeats. ``voltages`` and ``beside`` are the drive and the other axis' displacement
+    as the model meets them, ``finer`` values of each for a sample.
     """
 
     name: str
@@ -43,11 +45,52 @@ class AxisSignals:
     other: Array
     number: int = 0
     rates: tuple[float, ...] = ()
+    intersample: str = HELD
+    voltages: Array = field()
+    beside: Array = field()
+
+    @voltages.default
+    def _held(self) -> Array:
+        return held_voltages(self.drive, self.intersample)
+
+    @beside.default
+    def _between(self) -> Array:
+        return read_between(self.other, self.intersample)
+
+    @property
+    def finer(self) -> int:
+        """Values that the model meets for each sample."""
+        return finer(self.intersample)
 
     @property
     def duration(self) -> float:
         """Length of the record, s."""
         return len(self.drive) * self.sample_period
+
+    def part(self, count: int) -> "AxisSignals":
+        """The first samples."""
+        between = count * self.finer
+        return evolve(
+            self,
+            drive=self.drive[:count],
+            measured=self.measured[:count],
+            other=self.other[:count],
+            voltages=self.voltages[:between],
+            beside=self.beside[:between],
+        )
+
+    def halved(self, count: int) -> "AxisSignals":
+        """So many samples, every other one, of voltages averaged over pairs."""
+        both, between = 2 * count, 2 * count * self.finer
+        return evolve(
+            self,
+            sample_period=2.0 * self.sample_period,
+            drive=self.drive[:both].reshape(-1, 2).mean(axis=1),
+            measured=self.measured[:both:2].copy(),
+            other=self.other[:both:2].copy(),
+            voltages=self.voltages[:between].reshape(-1, 2).mean(axis=1),
+            beside=self.beside[:between:2].copy(),
+        )
 
 
 SAMPLES_PER_MOVE = 200
@@ -101,7 +144,8 @@ class Playback:
     def displacement(self, chain: Chain) -> Array:
         """Displacement (n,) in m that the chain predicts, with what the other axis adds."""
         chain = chain.of_record(self.view.number)
-        period, signal, changed = self.view.sample_period, self.view.drive, False
+        view = self.view
+        period, signal, changed = view.sample_period / view.finer, view.voltages, False
         for number, stage in enumerate(chain.stages()):
             changed = changed or number not in self._cache or self._cache[number][0] != stage
             if changed:
@@ -113,11 +157,11 @@ class Playback:
                 )
                 self._cache[number] = stage, played
             signal = self._cache[number][1]
-        return signal
+        return signal[:: view.finer]
 
     def _with_other(self, signal: Array, stage: Stage) -> Array:
-        """Signal (n,) with what the other axis adds before a stage."""
+        """Signal with what the other axis adds before a stage."""
         for element in stage.coupling:
-            effect = element.at(self.view.sample_period)
-            signal = signal + effect.apply(effect.at_rest(), self.view.other)[1]
+            effect = element.at(self.view.sample_period / self.view.finer)
+            signal = signal + effect.apply(effect.at_rest(), self.view.beside)[1]
         return signal

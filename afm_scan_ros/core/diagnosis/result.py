@@ -163,7 +163,7 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
     for names in [n for n in posterior.probability if n != own][:RUNNERS_UP]:
         why = WhyNot.CREDIBLE if names in credible else WhyNot.LESS_PROBABLE
         best = posterior.best.get(names)
-        cells = best.cells if best else selection.without
+        cells = (best or selection.without).cells
         yield Alternative(
             name=joined(names),
             kind=best.candidates[0].form.kind if best and len(names) == 1 else "",

@@ -44,7 +44,7 @@ class Posterior:
 
     @classmethod
     def of(
-        cls, without: CellFit, trials: Iterable[FittedCandidates], outside: float = -np.inf
+        cls, without: FittedCandidates, trials: Iterable[FittedCandidates], outside: float = -np.inf
     ) -> "Posterior":
         """Posterior over the model ``without`` an effect and the sets of some trials.
 
@@ -55,7 +55,7 @@ class Posterior:
         for trial in trials:
             by_set.setdefault(tuple(sorted(set(trial.names))), []).append(trial)
         distinct = {names: _distinct(found) for names, found in by_set.items()}
-        logs: dict[Names, float] = {(): without.log_likelihood}
+        logs: dict[Names, float] = {(): without.log_posterior}
         if np.isfinite(outside):
             logs[OUTSIDE] = outside + LOG_ODDS
         for names, found in distinct.items():
@@ -137,7 +137,7 @@ FITTED = 6
 class Selection:
     """Trials of one axis, ``without`` an effect, and their posterior."""
 
-    without: CellFit
+    without: FittedCandidates
     trials: tuple[FittedCandidates, ...]
     posterior: Posterior
 
@@ -149,7 +149,7 @@ class Selection:
     @property
     def reached(self) -> CellFit:
         """Fit of the likeliest set."""
-        return self.selected.cells if self.selected else self.without
+        return (self.selected or self.without).cells
 
 
 class ModelSearch:
@@ -165,7 +165,7 @@ class ModelSearch:
         progress: ProgressCallback,
     ) -> None:
         self.fitter, self._features, self._progress = fitter, features, progress
-        self._without = fitter.likelihood.fit(fitter.chain)
+        self._without = fitter.without
         self._outside = fitter.likelihood.outside()
         self._trials: list[FittedCandidates] = []
         self._found: list[FittedCandidates] = []
@@ -198,10 +198,10 @@ class ModelSearch:
         best = posterior.best.get(named)
         if self._size and (best is None or len(best.candidates) < self._size):
             return False
-        if not (best.cells if best else self._without).unremarkable:
+        reached = best or self._without
+        if not reached.cells.unremarkable:
             return True
-        chain = self.fitter.chain
-        return self._features(best.extended(chain) if best else chain).beyond_noise
+        return self._features(reached.extended(self.fitter.chain)).beyond_noise
 
     def _parents(self) -> Iterator[FittedCandidates]:
         """Yield the sets to extend: those near the best, more where the best lacks something."""
@@ -214,7 +214,7 @@ class ModelSearch:
 
     def _beside(self, parent: FittedCandidates | None) -> Iterator[FittedCandidates]:
         """Fit the most promising candidates beside a set."""
-        chain = parent.extended(self.fitter.chain) if parent else self.fitter.chain
+        chain = (parent or self._without).extended(self.fitter.chain)
         features, begun = self._features(chain), []
         present = parent.names if parent else ()
         for candidate in CANDIDATES:

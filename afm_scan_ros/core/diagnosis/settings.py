@@ -79,3 +79,18 @@ class PartingSettings:
 
 PARTING = PartingSettings()
 """The defaults."""
+
+
+@frozen
+class StructureSettings:
+    """Up to what a model counts as exact where its structure is traced."""
+
+    exact: float = setting(
+        1e-3,
+        "1",
+        "error of an exact model in a band, over its whole motion",
+        "the sensor's own drift and nonlinearity, a tenth of a per cent of good ones",
+    )
+
+
+STRUCTURE = StructureSettings()

@@ -18,6 +18,7 @@ from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import in_step, signals_of
+from afm_scan_ros.core.intersample import held_voltages
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
 
@@ -27,6 +28,8 @@ def fit_axis(
     axis: str,
     settings: FitSettings = DEFAULT_SETTINGS,
     progress: ProgressCallback = lambda _: None,
+    *,
+    linear: bool = False,
 ) -> AxisFit:
     """Fit all parameters of an axis to all of its records; none needs a kind.
 
@@ -40,6 +43,8 @@ def fit_axis(
         What is resolved, expected, and taken for significant.
     progress
         Is called with what is being fitted, and with what of a record does not count.
+    linear
+        Whether the scanner has no hysteresis, so that its operator stays a straight line.
 
     Returns
     -------
@@ -55,7 +60,7 @@ def fit_axis(
     ScanError
         Where the fit diverges.
     """
-    fit = started(records, axis, settings)
+    fit = started(records, axis, settings, linear=linear)
     for record in fit.records:
         if record.first:
             known = record.first * record.period
@@ -66,6 +71,8 @@ def fit_axis(
         fit.gain *= found.gain
         settle(fit, settings.most_steps, VIBRATION)
     refuse_unlike(fit)
+    if linear:
+        return _of_linear(fit, progress)
     progress("fitting the hysteresis by plays")
     fit = better(_of_plays(fit, progress), progress)
     while True:
@@ -80,6 +87,18 @@ def fit_axis(
     if len(fit.layout.lacking(fit.theta)[1]):
         progress("holding the hysteresis to its conditions")
         fit = _held_to_growth(fit)
+    if not fit.converged:
+        progress(f"not converged: {fit.remaining:.3g} nat may remain")
+    return fit
+
+
+def _of_linear(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Fit modes, lags, creep and tones to what a straight line leaves."""
+    while True:
+        settle(fit, fit.layout.settings.most_steps, LINEAR, searching=True)
+        if not (fit.find_tones() or add_mode(fit)):
+            break
+        progress("fitting a further mode")
     if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
@@ -116,31 +135,30 @@ def _held_to_growth(fit: AxisFit) -> AxisFit:
     return held if held.discrepancy**2 < fit.discrepancy**2 + lost else fit
 
 
-def started(records: Sequence[Record], axis: str, settings: FitSettings) -> AxisFit:
-    """Return a fit of no hysteresis, creep or vibration, and the gain of a straight line."""
+def started(
+    records: Sequence[Record], axis: str, settings: FitSettings, *, linear: bool = False
+) -> AxisFit:
+    """Return a fit of no hysteresis, creep or vibration, and the gain of a straight line.
+
+    A ``linear`` scanner remembers no drive before its records but by its lags and creep.
+    """
     given = [record.axis(axis) for record in records if axis in record.axes]
-    drives = [in_step(one.drive[:, 0], one.displacement[:, 0], settings) for one in given]
+    drives = [held_voltages(in_step(one, settings), one.intersample) for one in given]
     operator = Plays(*_range_of(drives, settings), settings)
     if operator.half == 0.0:
         raise InputError(f"no record moves {axis}: give one whose drive changes")
+    pairs = zip(given, drives, strict=True)
     signals = [
-        signals_of(
-            record.name,
-            drive,
-            record.displacement[:, 0],
-            record.sample_period,
-            depolarised=record.depolarised,
-            half_range=operator.half,
-            settings=settings,
-        )
-        for record, drive in zip(given, drives, strict=True)
+        signals_of(record, drive, operator.half, settings, remembers=not linear)
+        for record, drive in pairs
     ]
-    begun = [k for k, one in enumerate(signals) if not one.rested and not one.first]
+    begun = [k for k, one in enumerate(signals) if not (linear or one.rested or one.first)]
     for place, k in enumerate(begun):
         signals[k] = evolve(signals[k], unknown=place)
     longest = max(len(one.drive) * one.period for one in signals)
-    shortest = min(one.period for one in signals)
-    layout = evolve(layout_of(operator, longest, shortest, settings), unknown_starts=len(begun))
+    shortest = min(one.sampled for one in signals)
+    layout = layout_of(operator, longest, shortest, settings)
+    layout = evolve(layout, unknown_starts=len(begun), linear=linear)
     driven = np.concatenate([one.drive - one.drive.mean() for one in signals])
     moved = np.concatenate([one.displacement - one.displacement.mean() for one in signals])
     gain = float(driven @ moved / (driven @ driven))

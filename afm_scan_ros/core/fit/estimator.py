@@ -108,8 +108,8 @@ class AxisFit:
 
     @property
     def shortest(self) -> float:
-        """Sample period of the fastest record, s."""
-        return min(one.period for one in self.records)
+        """Time between samples of the fastest record, s."""
+        return min(one.sampled for one in self.records)
 
     @property
     def lags_alone(self) -> bool:
@@ -286,8 +286,9 @@ class AxisFit:
         parts = []
         for k, left in enumerate(self.residuals()):
             record = self.records[k]
-            if record.block == 1:
-                record = self.records[k] = evolve(record, noise=noise_of(left))
+            if record.block == record.finer:
+                noise = np.sqrt(record.finer) * noise_of(left)
+                record = self.records[k] = evolve(record, noise=noise)
             noise = record.noise**2 / record.block
             parts.append((len(left), float(left @ left), noise, record.motion**2))
         count, squares, noise, motion = np.array(parts).T

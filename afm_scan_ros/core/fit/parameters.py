@@ -45,7 +45,7 @@ class Layout:
     ``lags`` (s), of which the first is faster than any record shows, and creep's
     ``time_constants`` (s) have fixed places. Last come where depolarised rest is, and what each
     record of an unknown start remembers. Where the sensor is ``delayed``, it is by ``least_delay``
-    (s) at least.
+    (s) at least. Where it is ``linear``, the operator stays a straight line, and V has the gain.
     """
 
     operator: Operator
@@ -57,6 +57,7 @@ class Layout:
     sensor_order: int = 0
     delayed: bool = False
     least_delay: float = 0.0
+    linear: bool = False
 
     @cached_property
     def parts(self) -> Mapping[str, slice]:
@@ -94,7 +95,7 @@ class Layout:
         """Return the map from A to F; raises InputError where it turns back."""
         bends = theta[self.parts["map"]]
         ends = self.operator.lower, self.operator.upper
-        return OutputMap(*ends, tuple(bends)) if bends.any() else None
+        return OutputMap(*ends, tuple(bends)) if bends.any() and not self.linear else None
 
     def memory_part(self, record: Signals) -> slice:
         """Place in θ of what says where a record begins; an empty one where nothing does."""
@@ -206,7 +207,13 @@ class Layout:
 
     def of_any_gain(self, precision: Array) -> Array:
         """Return a prior's precision without the condition that V(0) is one."""
-        return np.asarray(precision - np.outer(self.static, self.static) / np.finfo(np.float32).eps)
+        return np.asarray(precision - self._unit_gain)
+
+    @cached_property
+    def _unit_gain(self) -> Array:
+        """Precision of V(0) about one: to its order, or exactly where the operator has the gain."""
+        exact = 1.0 if self.linear else float(np.finfo(np.float32).eps)
+        return np.asarray(np.outer(self.static, self.static) / exact)
 
     def prior(self, scales: Mapping[str, float], theta: Array) -> tuple[Array, Array]:
         """Precision of the prior, and its mean, shapes (size, size) and (size,).
@@ -214,7 +221,8 @@ class Layout:
         The frequency of a mode and the sensor's corner are those of ``theta`` within a factor of e,
         the damping is that of the settings within the same factor, and a delay is that of ``theta``
         within the slowest lag, one standard deviation each. All weights of V add up to one, which
-        only fixes how the gain is shared with the operator.
+        only fixes how the gain is shared with the operator. One that stays a straight line is known
+        to rounding.
         """
         parts, s = self.parts, self.settings
         groups = [self.operator.precision(name, scales) for name in self.operator.parts]
@@ -231,7 +239,11 @@ class Layout:
         groups.append(np.diag(self.operator.expected_rest() ** -2.0))
         groups += self.unknown_starts * [np.diag(self.operator.expected_memory() ** -2.0)]
         matrix, mean = block_diag(*(one for one in groups if len(one))), np.zeros(self.size)
-        matrix += np.outer(self.static, self.static) / np.finfo(np.float32).eps
+        if self.linear:
+            known = np.arange(parts["map"].stop)
+            matrix[known, known] += np.finfo(np.float32).eps ** -2.0
+            mean[: parts["map"].start] = self.operator.unbent()
+        matrix += self._unit_gain
         mean[parts["lags"].start] = 1.0
         first, last = parts["modes"].start, parts["modes"].stop
         mean[first:last:4] = theta[first:last:4]

@@ -11,6 +11,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.measured_drive import without_noise
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
+from afm_scan_ros.core.intersample import EDGE, HELD, finer, read_between
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
 
@@ -18,11 +20,12 @@ from afm_scan_ros.core.types import Array
 class Signals:
     """Drive u (V) and displacement y (m), both (n,), that count from sample ``first`` on.
 
-    ``rested`` is whether the scanner had long rested at 0 V, depolarised; otherwise ``unknown``
-    says which of the unknown starts of a fit the record has, where it has one. The drive is the
-    ``recorded`` one of ``late`` samples earlier, where it is late. ``noise`` (m) is the
-    standard deviation of a sample, ``tones`` (Hz) are sines in the displacement. Stretches of
-    blocks, of one row of derivatives each, have ``edges`` in samples.
+    ``finer`` samples stand for each that was measured. ``rested`` is whether the scanner had long
+    rested at 0 V, depolarised; otherwise ``unknown`` says which of the unknown starts of a fit the
+    record has, where it has one. The drive is the ``recorded`` one of ``late`` samples earlier,
+    where it is late. ``noise`` (m) is the standard deviation of a sample, ``tones`` (Hz) are sines
+    in the displacement. Stretches of blocks, of one row of derivatives each, have ``edges`` in
+    samples.
     """
 
     name: str
@@ -38,11 +41,17 @@ class Signals:
     unknown: int | None = None
     late: int = 0
     recorded: Array | None = None
+    finer: int = 1
 
     @property
     def given(self) -> Array:
         """The drive before it was made late, V."""
         return self.drive if self.recorded is None else self.recorded
+
+    @property
+    def sampled(self) -> float:
+        """Time between measured samples, s."""
+        return self.finer * self.period
 
     @property
     def blocks(self) -> int:
@@ -140,31 +149,37 @@ class Signals:
 
 
 def signals_of(
-    name: str,
+    record: Record,
     drive: Array,
-    displacement: Array,
-    period: float,
-    *,
-    depolarised: bool,
     half_range: float,
     settings: FitSettings,
+    *,
+    remembers: bool = True,
 ) -> Signals:
-    """Choose the blocks and stretches of a record, and from where on it counts.
+    """Choose the blocks and stretches of a record of one axis, and from where on it counts.
 
-    What comes before its memory is known is left out, unless that is most of it. ``half_range`` is
-    that of the operator (V).
+    Its ``drive`` (V) holds the voltages that led to each displacement. What comes before its memory
+    is known is left out where the scanner ``remembers``, unless that is most of the record.
+    ``half_range`` is that of the operator (V).
     """
-    noise = noise_of(displacement)
-    block = longest_block(drive, displacement, noise, settings)
-    if len(drive) < settings.fewest_blocks:
+    every, (measured,) = finer(record.intersample), record.displacement.T
+    if len(measured) < settings.fewest_blocks:
         raise InputError(
-            f"{name}: holds only {len(drive)} samples: give a record of"
+            f"{record.name}: holds only {len(measured)} samples: give a record of"
             f" {settings.fewest_blocks} at least"
         )
-    first = known_from(drive, settings, depolarised=depolarised)
+    displacement = read_between(measured, record.intersample)
+    if every > 1:
+        known = slice(0 if record.depolarised else every * EDGE, every * (len(measured) - EDGE))
+        drive, displacement = drive[known], displacement[known]
+    noise = float(np.sqrt(every)) * noise_of(measured)
+    block = longest_block(drive, displacement, noise, settings, every)
+    first = known_from(drive, settings, depolarised=record.depolarised or not remembers)
     first = first if first < settings.most_left_out * len(drive) else 0
     edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
-    return Signals(name, drive, displacement, period, block, first, depolarised, noise, edges)
+    period, begun = record.sample_period / every, record.depolarised
+    every_sample = record.name, drive, displacement, period
+    return Signals(*every_sample, block, first, begun, noise, edges, finer=every)
 
 
 def _later(drive: Array, samples: int) -> Array:
@@ -205,9 +220,10 @@ def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> boo
     return bool(abs(seen) > max(settings.read_after * noise, 0.5 * abs(seen + later)))
 
 
-def in_step(drive: Array, displacement: Array, settings: FitSettings) -> Array:
-    """Return a drive (V), (n,), as it led to the displacement read just before its next update."""
-    if not reads_after(drive, displacement, settings):
+def in_step(record: Record, settings: FitSettings) -> Array:
+    """Return a drive (V), (n,), of a record of one axis as if that were read before each update."""
+    drive, displacement = record.signals(record.axes[0])
+    if record.intersample != HELD or not reads_after(drive, displacement, settings):
         return drive
     return np.append(drive[1:], drive[-1])
 
@@ -238,9 +254,11 @@ def correlation_length(residual: Array) -> float:
     return float(1.0 + 2.0 * correlations[1:last].sum())
 
 
-def longest_block(drive: Array, displacement: Array, noise: float, settings: FitSettings) -> int:
+def longest_block(
+    drive: Array, displacement: Array, noise: float, settings: FitSettings, shortest: int = 1
+) -> int:
     """Length of the longest blocks between whose means both signals are straight."""
-    block = 1
+    block = shortest
     while len(drive) // (2 * block) >= settings.fewest_blocks:
         longer = 2 * block
         bent = _bend(drive, longer) > settings.bend * np.std(drive)

@@ -36,7 +36,8 @@ from afm_scan_ros.core.identification.validation import (
     of_fitted,
     validate_from,
 )
-from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.intersample import HELD
+from afm_scan_ros.core.model import AxisModel, EffectStatus, Status
 from afm_scan_ros.core.prediction_error import apart, discrepancy
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
@@ -87,9 +88,13 @@ class FittedAxis:
 
 
 def identify_axis(
-    records: Sequence[Record], axis: str, progress: ProgressCallback = lambda _: None
+    records: Sequence[Record],
+    axis: str,
+    progress: ProgressCallback = lambda _: None,
+    *,
+    linear: bool = False,
 ) -> FittedAxis:
-    """Identify an axis from all its records but those that are to validate.
+    """Identify an axis, ``linear`` or not, from all its records but those that are to validate.
 
     Raises InputError where the records show nothing or are not of one scanner, ScanError where the
     fit diverges.
@@ -98,10 +103,13 @@ def identify_axis(
     fitting = [one for one in records if one.kind != "validation"]
     if not fitting:
         raise InputError("validation records alone fit nothing: give more records")
-    fit = fit_axis(fitting, axis, progress=progress)
+    fit = fit_axis(fitting, axis, progress=progress, linear=linear)
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
-    model = evolve(model_of(fit), effects=told.effects())
+    effects = told.effects()
+    if linear:
+        effects = evolve(effects, hysteresis=EffectStatus(Status.ASSUMED))
+    model = evolve(model_of(fit), effects=effects)
     progress("validating")
     left_out = [_held_out(model, one, axis) for one in held_out]
     validations = [one.validation for one in left_out]
@@ -113,7 +121,7 @@ def identify_axis(
         known.append(of_fitted(error, fit.discrepancy))
     return FittedAxis(
         model=evolve(model.also_known(known), spread=spread),
-        operator="one state" if isinstance(fit.layout.operator, OneState) else "plays",
+        operator="none" if linear else _operator(fit),
         discrepancy=fit.discrepancy,
         deviation=deviation,
         records=tuple(_fitted_records(fit)),
@@ -126,6 +134,10 @@ def identify_axis(
         ),
         validations=tuple(validations),
     )
+
+
+def _operator(fit: AxisFit) -> str:
+    return "one state" if isinstance(fit.layout.operator, OneState) else "plays"
 
 
 def _fitted_records(fit: AxisFit) -> Iterator[FittedRecord]:
@@ -178,14 +190,13 @@ def _of_scan(model: AxisModel, spread: Spread, fit: AxisFit) -> float:
 
 def _in_step(record: Record) -> Record:
     """Return a record of one axis as it were read just before its drive's updates."""
-    drive = in_step(record.drive[:, 0], record.displacement[:, 0], DEFAULT_SETTINGS)
-    return evolve(record, drive=drive[:, np.newaxis])
+    return evolve(record, drive=in_step(record, DEFAULT_SETTINGS))
 
 
 def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
     """Yield the records that were read after their drive's updates."""
     for one in records:
-        if reads_after(*one.signals(axis), DEFAULT_SETTINGS):
+        if one.intersample == HELD and reads_after(*one.signals(axis), DEFAULT_SETTINGS):
             yield ReadAfterUpdate(one.name)
 
 

@@ -26,13 +26,16 @@ class Identification:
 
 
 def identify_records(
-    records: Sequence[Record], progress: ProgressCallback = lambda _: None
+    records: Sequence[Record],
+    progress: ProgressCallback = lambda _: None,
+    *,
+    linear: bool = False,
 ) -> Identification:
     """Identify each axis from whatever records of it there are, of any number and kinds.
 
-    Those of the kind "validation" are held out and give the model's error. What the others do not
-    identify is unknown in the model. Raises InputError where records are not of one scanner or show
-    nothing, ScanError where a fit diverges.
+    A ``linear`` scanner has no hysteresis. Those of the kind "validation" are held out and give the
+    model's error. What the others do not identify is unknown in the model. Raises InputError where
+    records are not of one scanner or show nothing, ScanError where a fit diverges.
     """
     axes = {}
     given = [checked(record) for record in records]
@@ -40,7 +43,7 @@ def identify_records(
         of_axis = [record.axis(axis) for record in given if axis in record.axes]
         if of_axis:
             with _naming(axis):
-                axes[axis] = identify_axis(of_axis, axis, _named(progress, axis))
+                axes[axis] = identify_axis(of_axis, axis, _named(progress, axis), linear=linear)
     return Identification(axes)
 
 

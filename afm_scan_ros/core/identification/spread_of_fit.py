@@ -76,7 +76,8 @@ def _left_out(model: AxisModel, spread: Spread, one: HeldOut) -> MissedMotion:
     """What the model leaves of a record beyond noise and beyond what its parameters explain."""
     period, part = one.record.sample_period, slice(one.first, None)
     drive, displacement = one.record.signals(one.record.axes[0])
-    explained = np.var(apart(model, spread, drive, period)[:, part], axis=1).sum()
+    each = apart(model, spread, drive, period, intersample=one.record.intersample)
+    explained = np.var(each[:, part], axis=1).sum()
     left = one.validation.residual  # from there on
     error = float(np.var(left)) - noise_of(left) ** 2
     moved = rms_by_band(displacement[part], spread.bands, period)

@@ -1,6 +1,7 @@
 """A model against a held-out record → the error that is known of it, by band."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from attrs import evolve, frozen
@@ -10,6 +11,7 @@ from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import extended_axis
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
+from afm_scan_ros.core.intersample import held_voltages, moved_by
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
@@ -49,8 +51,9 @@ def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
     """
     (axis,) = record.axes
     drive, displacement = record.signals(axis)
-    wider = extended_axis(model, drive)
-    _refuse_beyond(wider, drive, record.name)
+    voltages = held_voltages(drive, record.intersample)
+    wider = extended_axis(model, voltages)
+    _refuse_beyond(wider, voltages, record.name)
     both = residual_of(wider, record), displacement
     residual, moved = (signal[first:] - signal[first:].mean() for signal in both)
     period = record.sample_period
@@ -71,8 +74,8 @@ def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
 def residual_of(model: AxisModel, record: Record) -> Array:
     """Displacement (m) of a record of one axis less that predicted from depolarised rest, (n,)."""
     drive, displacement = record.signals(record.axes[0])
-    cascade = forward(model, record.sample_period)
-    return np.asarray(displacement - cascade.apply(cascade.at_rest(), drive)[1])
+    moved = moved_by(partial(forward, model), drive, record.sample_period, record.intersample)
+    return np.asarray(displacement - moved)
 
 
 def of_fitted(known: ModelDiscrepancy, share: float) -> ModelDiscrepancy:

@@ -28,6 +28,7 @@ from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model
+from helpers.posteriors import no_effect
 
 NU, KAPPA, UNTESTED = 1.4, 8.0, 2.0
 PERIOD, RESONANCE = 1e-4, 1000.0
@@ -209,7 +210,7 @@ def test_the_error_of_a_formula_counts_inside_the_range_alone(
     left = CellFit(*(np.array([each]) for each in (power, 30.0, KAPPA, NU)), 0.0)
     fit = Fit(np.array([[seconds]]), np.array([0.1]))
     trial = FittedCandidates((Candidate(effect_type("rate_dependent_hysteresis"), LAG),), fit, left)
-    without = evolve(left, log_likelihood=-100.0)
+    without = no_effect(evolve(left, log_likelihood=-100.0))
     selection = Selection(without, (trial,), Posterior.of(without, [trial]))
     view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
     chain = chain_of(default_model().x)

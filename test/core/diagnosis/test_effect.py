@@ -25,6 +25,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.diagnosis_text import evidence_text, why_not_text
 from helpers.in_process import ALL, default_model, scan
+from helpers.posteriors import no_effect
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
@@ -59,7 +60,7 @@ def traced(healthy: Record, *names: str, others: tuple[str, ...] = ()) -> AxisDi
     wrong = healthy.displacement + np.outer(moved, [1.0, 0.0])
     evidence = (evidence_of("x", default_model(), evolve(healthy, displacement=wrong)),)
     likelihood = Likelihood(evidence, CHAIN)
-    reached, without = likelihood.fit(chain), likelihood.fit(CHAIN)
+    reached, without = likelihood.fit(chain), no_effect(likelihood.fit(CHAIN))
     trials = (trial(names, reached), *(trial((name,), reached) for name in others))
     return AxisDiagnosis(
         axis="x",
@@ -148,7 +149,7 @@ def test_the_model_is_sufficient_where_it_is_the_most_probable(
     """An effect nearly as probable is not named; one far more probable is."""
     trace = traced(healthy, "drift")
     reached = trace.selection.trials[0]
-    without = evolve(reached.cells, log_likelihood=reached.log_posterior + none)
+    without = no_effect(evolve(reached.cells, log_likelihood=reached.log_posterior + none))
     posterior = Posterior.of(without, [reached])
     selection = Selection(without, (reached,), posterior)
     assert evolve(trace, selection=selection).verdict == verdict

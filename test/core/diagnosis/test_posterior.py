@@ -13,6 +13,7 @@ from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, Posterior
 from afm_scan_ros.core.effects.registry import effect_type
+from helpers.posteriors import no_effect
 
 NATS = st.floats(-50.0, 50.0)
 
@@ -37,27 +38,27 @@ DRIFT, LOGARITHMIC = ("drift", ""), ("drift", "logarithmic")
 
 @given(none=NATS, delay=NATS, lag=NATS)
 def test_probabilities_follow_from_the_evidence(none: float, delay: float, lag: float) -> None:
-    found = Posterior.of(fit(none), [trial(delay, DELAY), trial(lag, LAG)])
+    found = Posterior.of(no_effect(fit(none)), [trial(delay, DELAY), trial(lag, LAG)])
     assert sum(found.probability.values()) == pytest.approx(1.0)
     assert found.log_odds(("delay",), ()) == pytest.approx(delay - none)
     assert list(found.probability.values()) == sorted(found.probability.values(), reverse=True)
 
 
 def test_forms_of_an_effect_are_one_hypothesis() -> None:
-    found = Posterior.of(fit(0.0), [trial(3.0, DRIFT), trial(3.0, LOGARITHMIC)])
+    found = Posterior.of(no_effect(fit(0.0)), [trial(3.0, DRIFT), trial(3.0, LOGARITHMIC)])
     assert found.log_odds(("drift",), ()) == pytest.approx(3.0 + np.log(2.0))
     assert dict(found.kinds("drift")) == pytest.approx({"": 0.5, "logarithmic": 0.5})
 
 
 def test_the_order_of_effects_is_no_hypothesis() -> None:
-    found = Posterior.of(fit(0.0), [trial(3.0, DRIFT, DELAY), trial(2.0, DELAY, DRIFT)])
+    found = Posterior.of(no_effect(fit(0.0)), [trial(3.0, DRIFT, DELAY), trial(2.0, DELAY, DRIFT)])
     assert found.log_odds(("delay", "drift"), ()) == pytest.approx(3.0)
     assert found.best["delay", "drift"].names == ("drift", "delay")
 
 
 def test_an_effect_is_as_probable_as_all_sets_that_hold_it() -> None:
     trials = [trial(5.0, DELAY), trial(5.0, DELAY, DRIFT), trial(-30.0, LAG)]
-    found = Posterior.of(fit(-30.0), trials)
+    found = Posterior.of(no_effect(fit(-30.0)), trials)
     assert found.of_effect("delay") == pytest.approx(1.0)
     assert found.of_effect("drift") == pytest.approx(0.5)
     assert found.of_effect("input_lag") < 1e-9
@@ -65,12 +66,12 @@ def test_an_effect_is_as_probable_as_all_sets_that_hold_it() -> None:
 
 def test_the_credible_set_is_the_smallest() -> None:
     trials = [trial(np.log(8.0), DELAY), trial(np.log(1.5), LAG), trial(np.log(0.1), DRIFT)]
-    found = Posterior.of(fit(np.log(0.4)), trials)
+    found = Posterior.of(no_effect(fit(np.log(0.4))), trials)
     assert found.credible(0.95) == (("delay",), ("input_lag",))
 
 
 def test_something_outside_the_catalogue_is_as_frequent_as_one_of_its_effects() -> None:
-    found = Posterior.of(fit(0.0), [trial(-2.0, DELAY)], outside=3.0 - LOG_ODDS)
+    found = Posterior.of(no_effect(fit(0.0)), [trial(-2.0, DELAY)], outside=3.0 - LOG_ODDS)
     assert found.likeliest == OUTSIDE
     assert found.log_odds(OUTSIDE, ()) == pytest.approx(3.0)
     assert found.log_odds(OUTSIDE, ("delay",)) == pytest.approx(5.0)
@@ -87,7 +88,7 @@ def test_a_simpler_form_stands_for_an_effect_where_it_is_nearly_as_probable(
         evolve(trial(nats, form), fit=Fit(np.ones((1, count)), np.ones(count)))
         for nats, form, count in zip((gain, 0.0), forms, (3, 1), strict=True)
     ]
-    (best,) = Posterior.of(fit(-9.0), trials).best.values()
+    (best,) = Posterior.of(no_effect(fit(-9.0)), trials).best.values()
     assert best.candidates[0].form.kind == expected
 
 
@@ -98,6 +99,6 @@ def test_a_set_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred
     lacking = evolve(
         trial(0.0, DELAY), cells=evolve(trial(0.0, DELAY).cells, power=np.full(1, 1e6))
     )
-    found = Posterior.of(fit(-90.0), [lacking, trial(float(np.log(relative)), LAG)])
+    found = Posterior.of(no_effect(fit(-90.0)), [lacking, trial(float(np.log(relative)), LAG)])
     assert next(iter(found.logs)) == ("delay",)
     assert found.likeliest == chosen

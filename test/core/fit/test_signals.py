@@ -53,7 +53,7 @@ def test_a_record_of_steps_shows_whether_it_was_read_after_the_update(late: int)
     drive = np.repeat([0.0, 2.0, 0.5, 1.5], 200)
     noise = 1e-9 * np.random.default_rng(9).standard_normal(len(drive))
     moved = GAIN * np.concatenate([np.zeros(late), drive])[: len(drive)] + noise
-    given = in_step(drive, moved, SETTINGS)
+    given = in_step(afm.Record(drive, moved, PERIOD), SETTINGS)
     expected = drive if late else np.append(drive[1:], drive[-1])
     np.testing.assert_array_equal(given, expected)
 
@@ -62,7 +62,7 @@ def test_no_other_record_is_taken_for_one_read_after_the_update() -> None:
     """Of a resonance, its first samples follow in any way."""
     drive = levels(3, 10, 300)
     moved = displaced(OPERATORS["plays"], drive)
-    assert in_step(drive, moved, SETTINGS) is drive
+    assert np.array_equal(in_step(afm.Record(drive, moved, PERIOD), SETTINGS), drive)
 
 
 def test_memory_is_known_from_rest_or_from_both_ends() -> None:

@@ -1,0 +1,78 @@
+"""What the structure of a linear model lacks, of scanners that no code of the package moves."""
+
+import numpy as np
+import pytest
+
+import afm_scan_ros as afm
+from helpers.duffing import Oscillator, multisine
+
+PERIOD, FINER, COUNT = 1.0 / 610.0, 8, 6000
+NOISE = 2e-10
+HARDENING = Oscillator(cube=2e10)
+LOSING = Oscillator(loss=5e3 / Oscillator().omega)
+
+
+def recorded(scanner: Oscillator, seed: int, **stated: str) -> afm.Record:
+    """Return a record whose drive was measured, of a multisine that begins at rest."""
+    fine = multisine(FINER * COUNT, seed, share=0.3 / FINER)
+    moved = scanner.moved(fine, PERIOD / FINER)[::FINER]
+    moved = moved + NOISE * np.random.default_rng(seed).standard_normal(COUNT)
+    given = fine[::FINER], moved, PERIOD
+    return afm.Record(
+        *given, start="depolarised", intersample="band_limited", name=f"waves {seed}", **stated
+    )
+
+
+def identified(scanner: Oscillator) -> afm.Model:
+    """Return a linear model of it."""
+    records = [recorded(scanner, 1), recorded(scanner, 2, kind="validation")]
+    return afm.identify(records, linear=True)
+
+
+@pytest.fixture(scope="module")
+def hardening() -> afm.Model:
+    """A linear model of a spring that hardens."""
+    return identified(HARDENING)
+
+
+def error(model: afm.Model, record: afm.Record) -> float:
+    """Standard deviation of what a model leaves of a record over that of its motion."""
+    given = record.drive, record.sample_period
+    left = record.displacement - model.predict(*given, beyond=0.5, intersample="band_limited")
+    return float(np.std(left) / np.std(record.displacement))
+
+
+def test_a_spring_that_hardens_is_named(hardening: afm.Model) -> None:
+    """The model's own error explains the residual, unless its structure is asked for."""
+    record, fresh = recorded(HARDENING, 3), recorded(HARDENING, 4)
+    assert error(hardening, fresh) > 0.05
+    assert afm.diagnose(hardening, [record]).verdict == "model_sufficient"
+    found = afm.diagnose(hardening, [record], structure=True)
+    assert [effect.name for effect in found.effects] == ["nonlinear_spring"]
+    (effect,) = found.effects
+    assert effect.probability > 0.95
+    cubic = next(value for value in effect.values if value.parameter.name == "cubic")
+    assert cubic.interval[0] < HARDENING.cube < cubic.interval[1]
+    assert cubic.value == pytest.approx(HARDENING.cube, rel=0.05)
+    assert error(found.model, fresh) < 0.1 * error(hardening, fresh)
+
+
+def test_the_extended_model_follows_by_its_inverse(hardening: afm.Model) -> None:
+    """A smooth path is followed by a scanner whose spring hardens, better than without."""
+    model = afm.diagnose(hardening, [recorded(HARDENING, 3)], structure=True).model
+    period, count = 1e-4, 3000
+    path = 2e-6 * np.sin(np.linspace(0.0, 6.0 * np.pi, count)) ** 3
+    missed = []
+    for each in (hardening, model):
+        drive = each.invert(path, period)
+        missed.append(float(np.std(HARDENING.moved(drive, period) - path)))
+    assert missed[1] < 0.3 * missed[0]
+
+
+def test_an_effect_that_the_catalogue_lacks_is_not_named() -> None:
+    """A damper whose force grows with the cube of the speed."""
+    model = identified(LOSING)
+    assert error(model, recorded(LOSING, 4)) > 0.02
+    found = afm.diagnose(model, [recorded(LOSING, 3)], structure=True)
+    assert found.verdict == "unexplained"
+    assert not found.effects
