@@ -213,9 +213,8 @@ def diagnose(
         and longer. Coupled axes are diagnosed together.
     structure
         Whether to ask what the structure of the model lacks, and not what has changed since it was
-        identified. Its stated error then explains no residual, and gain, frequency and damping of
-        its first resonance are fitted anew beside each effect. An effect is named only where hardly
-        anything is left beside it.
+        identified. Its stated error then explains no residual, and its vibration is fitted anew
+        beside each effect. An effect is named only where hardly anything is left beside it.
 
     Returns
     -------

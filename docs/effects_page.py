@@ -46,8 +46,9 @@ of 454 Hz. For another scanner lengths scale with the displacement at its larges
 with that drive, and times with the period of its first resonance. Bounds and starting values of a
 diagnosis scale so, and so does what the equations call a part of that displacement.
 
-In the equations w is 2 pi `frequency`. In `hysteretic_stiffness` it is the angular frequency of the
-first resonance, whose damping is zeta. The first resonance is the one that rises highest.
+In the equations w is 2 pi `frequency`. In `hysteretic_stiffness` and `nonlinear_spring` it is the
+angular frequency of the first resonance, whose damping is zeta. The first resonance is the one that
+rises highest.
 
 `afm-scan calibrate --experiment NAME --out DIR` drives an experiment. For the base model it is a
 record of the calibration. At the neutral values of all its parameters an effect changes nothing.

@@ -47,6 +47,10 @@ def account_document(found: ResidualReport) -> Document:
             axis: [_base_parameter(*each) for each in diagnosed.moved]
             for axis, diagnosed in found.diagnosis.by_axis.items()
         },
+        "refitted": {
+            axis: dict(diagnosed.selection.refitted)
+            for axis, diagnosed in found.diagnosis.by_axis.items()
+        },
     }
 
 

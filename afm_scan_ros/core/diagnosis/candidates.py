@@ -133,12 +133,12 @@ class CandidateFitter:
         self.evidence, self.chain, self.beside = tuple(evidence), chain, tuple(beside)
         self.likelihood = Likelihood(self.evidence, chain)
         self._own: tuple[FittedCandidates | None, tuple[Array, ...]] = None, ()
-        self.without = self._fitted_without()
         if self.beside:
             self.likelihood = Likelihood(self.evidence, self.without.extended(chain))
 
-    def _fitted_without(self) -> FittedCandidates:
-        """Fit the forms beside the candidates alone."""
+    @cached_property
+    def without(self) -> FittedCandidates:
+        """The forms beside the candidates alone."""
         neutral = np.concatenate([np.empty(0), *(form.neutral for form in self.beside)])
         rows = np.tile(neutral, (len(self.evidence), 1))
         found = self._fitted((), rows) if self.beside else None

@@ -147,6 +147,13 @@ class Selection:
         return self.posterior.best.get(self.posterior.likeliest)
 
     @property
+    def refitted(self) -> Iterator[tuple[str, float]]:
+        """Names and values of what was fitted anew of the model."""
+        found = self.selected or self.without
+        names = (p.name for form in found.beside for p in form.parameters)
+        return zip(names, found.fit.values.tolist(), strict=False)
+
+    @property
     def reached(self) -> CellFit:
         """Fit of the likeliest set."""
         return (self.selected or self.without).cells

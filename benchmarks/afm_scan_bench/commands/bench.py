@@ -34,6 +34,7 @@ MEASURED = {
         "fsm_extended",
         "fsm_competing",
         "fsm_diagnosed",
+        "silverbox",
     )
 }
 SPEED = {

@@ -58,6 +58,10 @@ class Foretold(CandidateFitter):
             "Any", SimpleNamespace(fit=lambda chain: fit(chain, left), outside=lambda: -np.inf)
         )
 
+    @property
+    def without(self) -> FittedCandidates:  # type: ignore[override]
+        return self._fitted((), np.empty((1, 0)))
+
     def begin(
         self, selected: FittedCandidates | None, candidate: Candidate, _: ResidualFeatures
     ) -> InitialFit | None:
