@@ -4,12 +4,25 @@ from collections.abc import Iterator
 
 from attrs import fields
 
-from afm_scan_ros.core.diagnosis.settings import PartingSettings
+from afm_scan_ros.core.diagnosis.settings import (
+    DecimationSettings,
+    PartingSettings,
+    StructureSettings,
+)
 from afm_scan_ros.core.extension import ExtensionSettings
 from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.intersample import IntersampleSettings
 from afm_scan_ros.drivers.safety import SafetySettings
 
-SETTINGS: tuple[type, ...] = (SafetySettings, FitSettings, PartingSettings, ExtensionSettings)
+SETTINGS: tuple[type, ...] = (
+    SafetySettings,
+    FitSettings,
+    IntersampleSettings,
+    PartingSettings,
+    DecimationSettings,
+    StructureSettings,
+    ExtensionSettings,
+)
 
 INTRODUCTION = """\
 # Settings

@@ -21,6 +21,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit, MotionByBand
 from afm_scan_ros.core.diagnosis.records import Playback
+from afm_scan_ros.core.diagnosis.settings import DECIMATION
 from afm_scan_ros.core.diagnosis.tones import lasting_lines
 from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM, UNTESTED_FREEDOM, CellVariance
 from afm_scan_ros.core.effects.periodic_disturbance import undisturbed
@@ -185,15 +186,9 @@ class Evidence:
         return rms_by_band(self.residual(chain), self.limit.edges, period) / self.limit.rms
 
 
-LONG_RECORD = 8_000
-"""Samples up to which a record is not decimated, because its predictions take little time."""
-EQUAL_WITHIN = 0.3
-"""Share of the detection limit by which a prediction may differ in any band, a tenth in power."""
-
-
 def decimated(evidence: Evidence, chain: Chain) -> Evidence:
     """Evidence at the lowest rate that determines a chain as well; short records unchanged."""
-    if len(evidence.playback.view.drive) <= LONG_RECORD:
+    if len(evidence.playback.view.drive) <= DECIMATION.longest:
         return evidence
     fewer = _every_other(evidence, chain)
     return decimated(fewer, chain) if _same(evidence, fewer, chain) else evidence
@@ -223,4 +218,4 @@ def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:
     )
     below = max(lines, default=0.0) < limit.edges[-1]
     quiet = bool(evidence.ratio(chain)[unseen].max() < AT_LIMIT)
-    return bool(differs.max() < EQUAL_WITHIN) and quiet and below
+    return bool(differs.max() < DECIMATION.equal_within) and quiet and below

@@ -94,3 +94,21 @@ class StructureSettings:
 
 
 STRUCTURE = StructureSettings()
+
+
+@frozen
+class DecimationSettings:
+    """How far a record is decimated for the search of starting values."""
+
+    longest: int = setting(
+        8_000, "samples", "of a record that is not decimated", "its predictions take little time"
+    )
+    equal_within: float = setting(
+        0.3,
+        "1",
+        "share of the detection limit by which a prediction may differ in any band",
+        "a tenth in power",
+    )
+
+
+DECIMATION = DecimationSettings()

@@ -83,8 +83,11 @@ def with_beside(vibration: VibrationModel, resonance: Resonance, share: float) -
     return evolve(vibration, numerator=changed * (above[-1] / changed[-1]) / scale[1:])
 
 
-BESIDE = EffectParameter("share_beside", "1", 0.0, 2.0, 1e-6, neutral=1.0)
 REFIT = EffectForm(
-    "", ("vibration",), (*GAIN, *RESONANCE, BESIDE), insert, example=(1.02, 0.98, 1.1, 0.5)
+    "",
+    ("vibration",),
+    (*GAIN, *RESONANCE, EffectParameter("share_beside", "1", 0.0, 2.0, 1e-6, neutral=1.0)),
+    insert,
+    example=(1.02, 0.98, 1.1, 0.5),
 )
 """The vibration fitted anew, beside each effect and without one."""

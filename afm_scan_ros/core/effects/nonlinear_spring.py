@@ -26,8 +26,10 @@ from afm_scan_ros.core.effects.vibration import Resonance, VibrationModel, first
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 
-QUADRATIC = EffectParameter("quadratic", "1/m", -2e4, 2e4, 0.04)
-CUBIC = EffectParameter("cubic", "1/m2", -1e9, 1e9, 2e3)
+QUADRATIC, CUBIC = (
+    EffectParameter("quadratic", "1/m", -2e4, 2e4, 0.04),
+    EffectParameter("cubic", "1/m2", -1e9, 1e9, 2e3),
+)
 
 
 @frozen(eq=False)

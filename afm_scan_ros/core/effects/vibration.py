@@ -7,7 +7,7 @@ hold). A sample of the displacement is taken just before the converter's update,
 depends on inputs up to k - 1. The discretisation is exact under these assumptions.
 """
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from attrs import field, frozen
@@ -136,11 +136,12 @@ PERIODS = 9.0
 scanner lies ahead of it, 1e-11 on the default plant."""
 
 
+@lru_cache(maxsize=64)
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
     """Sample G behind a zero-order hold, exactly.
 
     Time is first scaled by the poles' geometric mean: the paper's coefficients span 14 decades,
-    the scaled ones one.
+    the scaled ones one. The last systems are kept, as a fit comes back to them.
     """
     whole, part = divmod(model.delay / sample_period, 1.0)
     a, late, c = _discrete(model, sample_period)

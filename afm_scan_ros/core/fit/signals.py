@@ -11,7 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.measured_drive import without_noise
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
-from afm_scan_ros.core.intersample import EDGE, HELD, finer, read_between
+from afm_scan_ros.core.intersample import HELD, INTERPOLATION, finer, read_between
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
@@ -170,7 +170,8 @@ def signals_of(
         )
     displacement = read_between(measured, record.intersample)
     if every > 1:
-        known = slice(0 if record.depolarised else every * EDGE, every * (len(measured) - EDGE))
+        edge = INTERPOLATION.edge
+        known = slice(0 if record.depolarised else every * edge, every * (len(measured) - edge))
         drive, displacement = drive[known], displacement[known]
     noise = float(np.sqrt(every)) * noise_of(measured)
     block = longest_block(drive, displacement, noise, settings, every)

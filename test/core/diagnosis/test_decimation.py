@@ -10,9 +10,10 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import evidence
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
 from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
-from afm_scan_ros.core.diagnosis.evidence import EQUAL_WITHIN, Evidence, decimated
+from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Playback
+from afm_scan_ros.core.diagnosis.settings import DECIMATION, DecimationSettings
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.record import Record
@@ -35,7 +36,7 @@ def healthy() -> Scan:
 
 @pytest.fixture(autouse=True)
 def _six_lines_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evidence, "LONG_RECORD", 20_000)
+    monkeypatch.setattr(evidence, "DECIMATION", DecimationSettings(longest=20_000))
 
 
 def evidence_for(done: Scan, axis: str = "x") -> Evidence:
@@ -55,17 +56,17 @@ def test_a_decimated_record_is_predicted_as_the_record_is(healthy: Scan) -> None
     sampled = whole.playback.displacement(chain)[::step][: count(seen)]
     moved = seen.playback.displacement(chain) - sampled
     assert step > 1
-    assert count(seen) <= evidence.LONG_RECORD
+    assert count(seen) <= evidence.DECIMATION.longest
     assert rms_by_band(moved, seen.limit.edges, period).max() > 0.0
     np.testing.assert_array_less(
-        rms_by_band(moved, seen.limit.edges, period), 2.0 * EQUAL_WITHIN * seen.limit.rms
+        rms_by_band(moved, seen.limit.edges, period), 2.0 * DECIMATION.equal_within * seen.limit.rms
     )
     assert seen.ratio(chain).max() < AT_LIMIT
 
 
 def test_a_short_record_is_not_decimated(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = evidence_for(healthy)
-    monkeypatch.setattr(evidence, "LONG_RECORD", count(whole))
+    monkeypatch.setattr(evidence, "DECIMATION", DecimationSettings(longest=count(whole)))
     assert CandidateFitter((whole,), CHAINS["x"]).decimated_evidence == (whole,)
 
 
@@ -104,7 +105,7 @@ def test_fits_start_alike_from_a_decimated_record(monkeypatch: pytest.MonkeyPatc
     plant = load_plant(share_directory() / "config/plants/delay_large.yaml")
     whole, chain = evidence_for(scan(SPEC, ALL, plant=plant)), CHAINS["x"]
     quick = begun(CandidateFitter((whole,), chain))
-    monkeypatch.setattr(evidence, "LONG_RECORD", count(whole))
+    monkeypatch.setattr(evidence, "DECIMATION", DecimationSettings(longest=count(whole)))
     slow = begun(CandidateFitter((whole,), chain))
     assert list(quick) == list(slow)
     assert next(iter(quick)) == ("delay", "")
