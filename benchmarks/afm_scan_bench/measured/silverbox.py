@@ -37,7 +37,7 @@ COLUMNS = {
 
 
 @frozen(eq=False, slots=False)
-class Study:
+class SilverboxLoop:
     """The models of the Silverbox, and what they leave of the parts that are left out."""
 
     @cached_property
@@ -80,13 +80,13 @@ class Study:
 
 def measure() -> Table:
     """Identify, diagnose, and score both models on the arrow and on two realisations."""
-    study = Study()
+    study = SilverboxLoop()
     models = ("linear", study.linear), ("extended by the diagnosis", study.found.model)
     rows = [_row(study, *each) for each in models]
     return Table("silverbox", _title(study), COLUMNS, rows, picture=partial(figure, study))
 
 
-def _row(study: Study, name: str, model: afm.Model) -> Row:
+def _row(study: SilverboxLoop, name: str, model: afm.Model) -> Row:
     scores = {
         f"{part}_mv": 1e3 * float(np.std(study.left(model, samples)))
         for part, samples in LEFT_OUT.items()
@@ -94,7 +94,7 @@ def _row(study: Study, name: str, model: afm.Model) -> Row:
     return {"model": name, **scores}
 
 
-def _title(study: Study) -> str:
+def _title(study: SilverboxLoop) -> str:
     found, values = study.found, []
     for effect in found.effects:
         for value in effect.values:
@@ -110,7 +110,7 @@ def _title(study: Study) -> str:
 
 
 @styled
-def figure(study: Study) -> Figure:
+def figure(study: SilverboxLoop) -> Figure:
     """What both models leave of the arrow, along it."""
     drawn = Figure(figsize=(9.6, 3.4), dpi=120, layout="constrained")
     axes = drawn.add_subplot()
