@@ -19,6 +19,8 @@ INPUTS := setup.py pyproject.toml benchmarks/pyproject.toml package.xml resource
 
 # Tests start many processes, each of which would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
+# As the commands do: a process works on each core, and more threads would wait for each other.
+export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-suite test-nodes test-ros test-faults test-evidence check docs clean

@@ -3,6 +3,7 @@
 ``afm-scan run`` runs one node, where there is no ``ros2 run``.
 """
 
+import os
 import sys
 import warnings
 from importlib import import_module
@@ -61,8 +62,13 @@ class _Lazy(click.Group):
         return [*COMMANDS, *BENCHMARKS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command NAME of its module in ``afm_scan_ros.cli``, or of its feature."""
+        """Return the command NAME of its module in ``afm_scan_ros.cli``, or of its feature.
+
+        It is imported with one thread of linear algebra, unless the environment says otherwise: the
+        matrices are small, and more threads wait for each other twice as long as they work.
+        """
         del ctx
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
         if cmd_name not in COMMANDS:
             return _plugin(cmd_name)
         name = cmd_name.replace("-", "_")
