@@ -10,6 +10,7 @@ from afm_scan_ros.core.identification.identify import (
     Identification,
     identify_records,
 )
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import share_directory
@@ -62,3 +63,16 @@ def test_the_model_discrepancy_is_that_of_the_validation_record(found: Identific
         assert known.record.startswith("validation:")
         assert np.linalg.norm(known.rms) < 3e-3 * np.linalg.norm(known.displacement)
         assert np.linalg.norm(known.noise) == pytest.approx(2e-9, rel=0.1)  # config/plant.yaml
+
+
+@pytest.mark.parametrize("lowest", [0.5, -5.0])
+def test_a_drive_that_stays_away_from_zero_is_identified(lowest: float) -> None:
+    """The scanner then rests, as far as the model goes, at the limit that is nearest to 0 V."""
+    rng, seconds = np.random.default_rng(1), 0.005 * np.arange(3000)
+    growing = np.linspace(0.3, 1.0, len(seconds))
+    drive = lowest + 1.5 + 1.5 * np.sin(2.0 * np.pi * seconds) * growing
+    moved = 1e-5 * (drive + 0.02 * drive**2)
+    record = Record(drive, moved + 5e-9 * rng.standard_normal(len(drive)), 0.005)
+    (axis,) = identify_records([record], linear=True).axes.values()
+    (left,) = axis.records
+    assert left.misfit.sigma < 0.05 * np.std(moved)
