@@ -250,6 +250,8 @@ def diagnose(
     longest = positive("longest", longest, "in s, as 60.0")
     well = tuple(named(all_of_type(Record, "healthy", healthy, RECORDS), "healthy record"))
     if model.is_coupled:
+        if structure:
+            raise InputError(f"{model.origin}: is of coupled axes: leave out structure")
         return _coupled(model, given, well, progress or (lambda _: None))
     scanner = model.scanner
     for record in (*given, *well):

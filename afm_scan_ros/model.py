@@ -23,7 +23,7 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import SHARE, extended
-from afm_scan_ros.core.intersample import HELD, finer, voltages_of
+from afm_scan_ros.core.intersample import HELD, upsampling, voltages_of
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction_error import standard_deviation
@@ -206,10 +206,10 @@ class Model:
         """
         share = _share_of(beyond)
         if not isinstance(self._scanner, ScannerModel):
-            if return_std or share:
+            if return_std or share or intersample != HELD:
                 raise InputError(
-                    "a model of coupled axes predicts neither beyond its range nor a standard"
-                    " deviation: leave out beyond and return_std"
+                    "a model of coupled axes predicts neither beyond its range, nor a standard"
+                    " deviation, nor between samples: leave out beyond, return_std and intersample"
                 )
             return self._scanner.predict(
                 self._scanner.checked("drive", drive, sample_period), periodic=periodic
@@ -217,7 +217,7 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
-        voltages, every = voltages_of(given, intersample), finer(intersample)
+        voltages, every = voltages_of(given, intersample), upsampling(intersample)
         model = extended(self.scanner, voltages, share) if share else self.scanner
         try:
             fine = predict(model, voltages)

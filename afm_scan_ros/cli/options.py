@@ -256,7 +256,7 @@ topic_option = click.option(
 )
 table_options = grouped("tables", TableOptions, *TABLE)
 """What tables do not state."""
-START = (
+UNSTATED = (
     click.option(
         "--depolarised",
         is_flag=True,
@@ -271,5 +271,5 @@ START = (
         " were measured behind an anti-aliasing filter.",
     ),
 )
-record_options = grouped("tables", TableOptions, *TABLE, topic_option, *START)
+record_options = grouped("tables", TableOptions, *TABLE, topic_option, *UNSTATED)
 """What tables and bags do not state."""

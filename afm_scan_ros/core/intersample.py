@@ -2,12 +2,12 @@
 
 A converter holds each voltage until the next update. A drive that was measured is band-limited
 instead: an anti-aliasing filter stands before the recorder. Of such a drive v the model is given
-``finer`` times as many held voltages u, of which the part below half the sample rate is v itself:
+m times as many held voltages u, of which the part below half the sample rate is v itself:
 
-    U(f) = V(f) e^{jπfh} / sinc(fh),    h = T / finer,
+    U(f) = V(f) e^{jπfh} / sinc(fh),    h = T / m,
 
-since a hold of h delays by h/2 and passes sinc(fh). The holds leave an image at finer/T - f, of the
-amplitude f/(finer/T - f): a tenth at f = 0.36/T, and ten times above f, where a structure of second
+since a hold of h delays by h/2 and passes sinc(fh). The holds leave an image at m/T - f, of the
+amplitude f/(m/T - f): a tenth at f = 0.36/T, and ten times above f, where a structure of second
 order passes a hundredth of that. The names are those of the property InterSample of L. Ljung,
 System Identification Toolbox, which calls them zoh and bl.
 """
@@ -31,7 +31,7 @@ INTERSAMPLE = (HELD, BAND_LIMITED)
 class IntersampleSettings:
     """How a band-limited signal is interpolated."""
 
-    finer: int = setting(
+    upsampling: int = setting(
         4,
         "1",
         "held voltages for each sample of a band-limited drive",
@@ -41,7 +41,7 @@ class IntersampleSettings:
     edge: int = setting(
         16,
         "samples",
-        "at either end of a record, between which what lies beyond counts",
+        "at either end of a record, which a fit leaves out unless the scanner rests there",
         "a band-limited interpolation sees some ten samples",
     )
 
@@ -49,7 +49,7 @@ class IntersampleSettings:
 INTERPOLATION = IntersampleSettings()
 
 
-def finer(intersample: str) -> int:
+def upsampling(intersample: str) -> int:
     """Held voltages for each sample of a drive of an intersample behaviour.
 
     Raises InputError for an unknown one.
@@ -57,24 +57,24 @@ def finer(intersample: str) -> int:
     if intersample not in INTERSAMPLE:
         known = ", ".join(INTERSAMPLE)
         raise InputError(f"intersample {intersample!r} is unknown: give one of {known}")
-    return INTERPOLATION.finer if intersample == BAND_LIMITED else 1
+    return INTERPOLATION.upsampling if intersample == BAND_LIMITED else 1
 
 
 def held_voltages(drive: Array, intersample: str) -> Array:
-    """Return the voltages (n · finer,) whose holds make a drive (n,), in V."""
+    """Return the voltages (n · upsampling,) whose holds make a drive (n,), in V."""
     if intersample == HELD:
         return drive
-    return _interpolated(drive, lambda turn: np.exp(0.5j * turn) / np.sinc(turn / (2.0 * np.pi)))
+    return _interpolated(drive, lambda omega: np.exp(0.5j * omega) / np.sinc(omega / (2.0 * np.pi)))
 
 
 def voltages_of(drive: Trace, intersample: str) -> Trace:
     """Return the voltages whose holds make the drive (V) of both axes."""
     both = (held_voltages(of_axis, intersample) for of_axis in (drive.x, drive.y))
-    return Trace(drive.first_sample, drive.sample_period / finer(intersample), *both)
+    return Trace(drive.first_sample, drive.sample_period / upsampling(intersample), *both)
 
 
 def read_between(displacement: Array, intersample: str) -> Array:
-    """Return a displacement (n,) at ``finer`` times as many samples, between those measured."""
+    """Return a displacement (n,) upsampled as its drive is, shape (n · upsampling,)."""
     return displacement if intersample == HELD else _interpolated(displacement, np.ones_like)
 
 
@@ -85,27 +85,26 @@ def moved_by(
 
     ``forward`` makes the model at a sample period (s).
     """
-    every = finer(intersample)
+    every = upsampling(intersample)
     cascade = forward(sample_period / every)
     return cascade.apply(cascade.at_rest(), held_voltages(drive, intersample))[1][::every]
 
 
 def _interpolated(signal: Array, gain: Callable[[Array], Array]) -> Array:
-    """Interpolate a signal (n,), with a gain at each angle a sample of the finer one, in rad.
+    """Upsample a signal (n,), with a gain at each angular frequency in rad per upsampled sample.
 
-    Beyond either end the signal goes on as its image in the end's own sample, which keeps value and
-    slope, and then turns smoothly into what is beyond the other end.
+    Beyond either end the signal goes on as its odd reflection in the end, which keeps value and
+    slope; half a cosine joins both reflections.
     """
-    count, every = len(signal), INTERPOLATION.finer
-    beyond = min(count - 1, 8 * INTERPOLATION.edge)
-    imaged = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
-    padded = next_fast_len(len(imaged) + count, real=True)
-    turned = padded - len(imaged)
-    way = 0.5 - 0.5 * np.cos(np.pi * (np.arange(turned) + 0.5) / turned)
-    around = np.concatenate([imaged, imaged[-1] + (imaged[0] - imaged[-1]) * way])
+    count, every = len(signal), INTERPOLATION.upsampling
+    reflected = np.pad(signal, count - 1, mode="reflect", reflect_type="odd")
+    padded = next_fast_len(len(reflected) + count, real=True)
+    joining = padded - len(reflected)
+    way = 0.5 - 0.5 * np.cos(np.pi * (np.arange(joining) + 0.5) / joining)
+    around = np.append(reflected, reflected[-1] + (reflected[0] - reflected[-1]) * way)
     spectrum = np.fft.rfft(around)
-    turn = 2.0 * np.pi * np.arange(len(spectrum)) / padded / every
-    fine = np.zeros(every * padded // 2 + 1, complex)
-    fine[: len(spectrum)] = every * gain(turn) * spectrum
-    first = every * beyond
-    return np.fft.irfft(fine, every * padded)[first : first + every * count]
+    omega = 2.0 * np.pi * np.arange(len(spectrum)) / padded / every
+    upsampled = np.zeros(every * padded // 2 + 1, complex)
+    upsampled[: len(spectrum)] = every * gain(omega) * spectrum
+    first = every * (count - 1)
+    return np.fft.irfft(upsampled, every * padded)[first : first + every * count]

@@ -17,7 +17,7 @@ from afm_scan_ros.core.arguments import (
 )
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
-from afm_scan_ros.core.intersample import HELD, finer
+from afm_scan_ros.core.intersample import HELD, upsampling
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace, by_value, channels_of, trace_of
@@ -120,7 +120,7 @@ class Record:
             raise InputError(f"kind {self.kind!r} is unknown: give one of {', '.join(KINDS)}")
         if self.start not in STARTS:
             raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
-        finer(self.intersample)
+        upsampling(self.intersample)
         if self.scan is not None:
             of_type(ScanSpec, "scan", self.scan, SPEC)
 

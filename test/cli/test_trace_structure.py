@@ -41,6 +41,6 @@ def test_the_spring_that_a_linear_model_lacks_is_found_by_commands(tmp_path: Pat
     before, after = (found[f"residual_rms_{when}_m"]["x"] for when in ("before", "after"))
     assert after < 0.1 * before
     assert set(found["refitted"]["x"]) == {
-        *("factor", "frequency_factor", "damping_factor", "share_beside")
+        *("factor", "frequency_factor", "damping_factor", "remainder_factor")
     }
     assert (out / "model.extended.yaml").exists()

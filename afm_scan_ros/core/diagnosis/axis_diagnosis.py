@@ -25,7 +25,7 @@ from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
 from afm_scan_ros.core.diagnosis.settings import PARTING
-from afm_scan_ros.core.diagnosis.structure import REFIT
+from afm_scan_ros.core.diagnosis.structure import refit_of
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
@@ -241,7 +241,8 @@ def diagnose_axis(
     chain = chain_of(model.axis(axis))
     given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
     free, evidence = ((), tuple(given)) if structure else with_base_parameters(given, chain)
-    search = partial(_search, chain=chain, progress=progress, beside=(REFIT,) if structure else ())
+    nuisance = (refit_of(model.axis(axis)),) if structure else ()
+    search = partial(_search, chain=chain, progress=progress, nuisance=nuisance)
     fresh = tuple(each.from_depolarised(chain) for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
         return _diagnosed(axis, search(evidence), free)
@@ -252,9 +253,9 @@ def _search(
     evidence: tuple[Evidence, ...],
     chain: Chain,
     progress: ProgressCallback,
-    beside: tuple[EffectForm, ...],
+    nuisance: tuple[EffectForm, ...],
 ) -> ModelSearch:
-    fitter = CandidateFitter(evidence, chain, beside)
+    fitter = CandidateFitter(evidence, chain, nuisance)
     return ModelSearch(
         fitter, lambda c: features_of(fitter.decimated_evidence, evidence, c), progress
     )

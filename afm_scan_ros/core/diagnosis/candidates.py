@@ -45,18 +45,18 @@ CANDIDATES = tuple(
 class FittedCandidates:
     """Candidates fitted together, and what they leave in the cells of all records.
 
-    The forms ``beside`` them belong to every hypothesis, and their values come first.
+    The ``nuisance`` forms belong to every hypothesis, and their values come first.
     """
 
     candidates: tuple[Candidate, ...]
     fit: Fit
     cells: CellFit
-    beside: tuple[EffectForm, ...] = ()
+    nuisance: tuple[EffectForm, ...] = ()
 
     @property
     def forms(self) -> tuple[EffectForm, ...]:
         """All forms, in the order in which they are inserted."""
-        return (*self.beside, *(candidate.form for candidate in self.candidates))
+        return (*self.nuisance, *(candidate.form for candidate in self.candidates))
 
     @property
     def log_posterior(self) -> float:
@@ -72,23 +72,20 @@ class FittedCandidates:
     @property
     def at_end(self) -> bool:
         """Whether a value is at an end of its range, where the effect is not as the catalogue's."""
-        each = [p for form in self.forms for p in form.parameters]
-        numbers = zip(each, self.fit.values, self.fit.halfwidth, strict=True)
+        each = [p for candidate in self.candidates for p in candidate.form.parameters]
+        own = slice(len(self.fit.values) - len(each), None)
+        numbers = zip(each, self.fit.values[own], self.fit.halfwidth[own], strict=True)
         return any(parameter.at_end(value, half) for parameter, value, half in numbers)
 
     def part(self, place: int) -> slice:
         """Where the parameters of one of the candidates stand among those of all."""
-        forms, at = self.forms, len(self.beside) + place
+        forms, at = self.forms, len(self.nuisance) + place
         first = sum(len(form.parameters) for form in forms[:at])
         return slice(first, first + len(forms[at].parameters))
 
     def extended(self, chain: Chain) -> Chain:
         """Chain with the candidates at the fitted values."""
         return inserted(chain, self.forms, self.fit.rows)
-
-    def base(self, chain: Chain) -> Chain:
-        """Chain with the forms beside the candidates alone."""
-        return inserted(chain, self.beside, self.fit.rows)
 
     def deviated(self, chain: Chain, share: float) -> Iterator[Chain]:
         """Yield the chain for a further record at a ``share`` of each deviation of the values.
@@ -106,7 +103,7 @@ class FittedCandidates:
 
     def without(self, chain: Chain, place: int) -> Chain:
         """Chain with all candidates but one, at the values of the joint fit."""
-        at = len(self.beside) + place
+        at = len(self.nuisance) + place
         forms = [form for i, form in enumerate(self.forms) if i != at]
         return inserted(chain, forms, np.delete(self.fit.rows, self.part(place), axis=1))
 
@@ -123,27 +120,29 @@ class InitialFit:
 class CandidateFitter:
     """Fits candidates to the records of one axis, each inserted into a chain.
 
-    Starting values come from ``decimated_evidence``. Fits and scores use the full records. Some
-    forms are fitted ``beside`` them, and where there are no candidates.
+    Starting values come from ``decimated_evidence``. Fits and scores use the full records. The
+    ``nuisance`` forms are fitted with any candidates, and without.
     """
 
     def __init__(
-        self, evidence: Sequence[Evidence], chain: Chain, beside: Sequence[EffectForm] = ()
+        self, evidence: Sequence[Evidence], chain: Chain, nuisance: Sequence[EffectForm] = ()
     ) -> None:
-        self.evidence, self.chain, self.beside = tuple(evidence), chain, tuple(beside)
+        self.evidence, self.chain, self.nuisance = tuple(evidence), chain, tuple(nuisance)
         self.likelihood = Likelihood(self.evidence, chain)
         self._own: tuple[FittedCandidates | None, tuple[Array, ...]] = None, ()
-        if self.beside:
+        if self.nuisance:
             self.likelihood = Likelihood(self.evidence, self.without.extended(chain))
 
     @cached_property
     def without(self) -> FittedCandidates:
-        """The forms beside the candidates alone."""
-        neutral = np.concatenate([np.empty(0), *(form.neutral for form in self.beside)])
+        """The nuisance forms alone."""
+        neutral = np.concatenate([np.empty(0), *(form.neutral for form in self.nuisance)])
         rows = np.tile(neutral, (len(self.evidence), 1))
-        found = self._fitted((), rows) if self.beside else None
+        found = self._fitted((), rows) if self.nuisance else None
         cells = self.likelihood.fit(self.chain)
-        return found or FittedCandidates((), Fit(rows, np.zeros_like(neutral)), cells, self.beside)
+        return found or FittedCandidates(
+            (), Fit(rows, np.zeros_like(neutral)), cells, self.nuisance
+        )
 
     @cached_property
     def decimated_evidence(self) -> tuple[Evidence, ...]:
@@ -226,7 +225,7 @@ class CandidateFitter:
         return Problem(self.decimated_evidence, self.chain, self._forms(candidates))
 
     def _forms(self, candidates: Sequence[Candidate]) -> list[EffectForm]:
-        return [*self.beside, *(candidate.form for candidate in candidates)]
+        return [*self.nuisance, *(candidate.form for candidate in candidates)]
 
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
         forms = self._forms(candidates)
@@ -240,7 +239,7 @@ class CandidateFitter:
                 return None
             cells = self.likelihood.fit(inserted(self.chain, forms, found.rows))
             evidence, rows = self.likelihood.reweighted(cells), found.rows
-            trial = FittedCandidates(candidates, found, cells, self.beside)
+            trial = FittedCandidates(candidates, found, cells, self.nuisance)
         return trial
 
     def on_fitted_stretches(self, selected: FittedCandidates) -> Chain:

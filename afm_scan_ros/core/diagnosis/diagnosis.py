@@ -5,6 +5,7 @@ from concurrent.futures import Future
 from threading import Thread
 from typing import TypeVar
 
+import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
@@ -37,7 +38,7 @@ from afm_scan_ros.core.diagnosis.result import (
     effects,
     joined,
 )
-from afm_scan_ros.core.diagnosis.structure import counted_exact
+from afm_scan_ros.core.diagnosis.structure import counted_exact, refitted
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import with_overshoot
@@ -191,8 +192,9 @@ def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:
         Added(c.effect.name, c.form.kind, tuple(selected.fit.values[selected.part(place)]))
         for place, c in enumerate(selected.candidates)
     )
-    found = selected.base(diagnosed.chain).model
-    return evolve(axis, vibration=found.vibration, added=(*axis.added, *added))
+    values = np.array([value for _, value in diagnosed.selection.refitted])
+    base = refitted(axis, values) if len(values) else axis
+    return evolve(base, added=(*axis.added, *added))
 
 
 def _proposals(

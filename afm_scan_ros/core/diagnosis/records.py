@@ -13,7 +13,7 @@ from attrs import define, evolve, field, frozen
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
-from afm_scan_ros.core.intersample import HELD, finer, held_voltages, read_between
+from afm_scan_ros.core.intersample import HELD, held_voltages, read_between, upsampling
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, floats
 
@@ -34,8 +34,8 @@ class AxisSignals:
 
     ``other`` is the other axis' own displacement, as the model predicts it. ``number`` is the place
     of the record among those diagnosed together. ``rates`` (Hz) are those at which the motion of
-    either axis repeats. ``voltages`` and ``beside`` are the drive and the other axis' displacement
-    as the model meets them, ``finer`` values of each for a sample.
+    either axis repeats. ``voltages`` and ``other_between`` are the drive and the other axis'
+    displacement as the model meets them, ``upsampling`` values of each for a sample.
     """
 
     name: str
@@ -47,20 +47,20 @@ class AxisSignals:
     rates: tuple[float, ...] = ()
     intersample: str = HELD
     voltages: Array = field()
-    beside: Array = field()
+    other_between: Array = field()
 
     @voltages.default
     def _held(self) -> Array:
         return held_voltages(self.drive, self.intersample)
 
-    @beside.default
+    @other_between.default
     def _between(self) -> Array:
         return read_between(self.other, self.intersample)
 
     @property
-    def finer(self) -> int:
+    def upsampling(self) -> int:
         """Values that the model meets for each sample."""
-        return finer(self.intersample)
+        return upsampling(self.intersample)
 
     @property
     def duration(self) -> float:
@@ -69,19 +69,19 @@ class AxisSignals:
 
     def part(self, count: int) -> "AxisSignals":
         """The first samples."""
-        between = count * self.finer
+        between = count * self.upsampling
         return evolve(
             self,
             drive=self.drive[:count],
             measured=self.measured[:count],
             other=self.other[:count],
             voltages=self.voltages[:between],
-            beside=self.beside[:between],
+            other_between=self.other_between[:between],
         )
 
     def halved(self, count: int) -> "AxisSignals":
         """So many samples, every other one, of voltages averaged over pairs."""
-        both, between = 2 * count, 2 * count * self.finer
+        both, between = 2 * count, 2 * count * self.upsampling
         return evolve(
             self,
             sample_period=2.0 * self.sample_period,
@@ -89,7 +89,7 @@ class AxisSignals:
             measured=self.measured[:both:2].copy(),
             other=self.other[:both:2].copy(),
             voltages=self.voltages[:between].reshape(-1, 2).mean(axis=1),
-            beside=self.beside[:between:2].copy(),
+            other_between=self.other_between[:between:2].copy(),
         )
 
 
@@ -145,7 +145,7 @@ class Playback:
         """Displacement (n,) in m that the chain predicts, with what the other axis adds."""
         chain = chain.of_record(self.view.number)
         view = self.view
-        period, signal, changed = view.sample_period / view.finer, view.voltages, False
+        period, signal, changed = view.sample_period / view.upsampling, view.voltages, False
         for number, stage in enumerate(chain.stages()):
             changed = changed or number not in self._cache or self._cache[number][0] != stage
             if changed:
@@ -157,11 +157,11 @@ class Playback:
                 )
                 self._cache[number] = stage, played
             signal = self._cache[number][1]
-        return signal[:: view.finer]
+        return signal[:: view.upsampling]
 
     def _with_other(self, signal: Array, stage: Stage) -> Array:
         """Signal with what the other axis adds before a stage."""
         for element in stage.coupling:
-            effect = element.at(self.view.sample_period / self.view.finer)
-            signal = signal + effect.apply(effect.at_rest(), self.view.beside)[1]
+            effect = element.at(self.view.sample_period / self.view.upsampling)
+            signal = signal + effect.apply(effect.at_rest(), self.view.other_between)[1]
         return signal

@@ -150,7 +150,7 @@ class Selection:
     def refitted(self) -> Iterator[tuple[str, float]]:
         """Names and values of what was fitted anew of the model."""
         found = self.selected or self.without
-        names = (p.name for form in found.beside for p in form.parameters)
+        names = (p.name for form in found.nuisance for p in form.parameters)
         return zip(names, found.fit.values.tolist(), strict=False)
 
     @property

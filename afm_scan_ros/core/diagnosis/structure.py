@@ -2,14 +2,14 @@
 
 Ordinarily a diagnosis asks what has changed since the model was identified, and its error on the
 records of that time explains a residual as large. Here the model counts as exact, but for a share
-of the motion. An effect is named only where nearly nothing is left beside it, as without one the
-lack of fit is too large for any verdict but "unexplained".
+of the motion. An effect is named only where nearly nothing is left with it; otherwise the lack of
+fit makes the verdict "unexplained".
 
 A model that lacks an effect has been fitted around it: the best linear approximation of a spring
 that hardens has a higher resonance than the spring at rest (J. Schoukens, R. Pintelon and
 Y. Rolain, Mastering System Identification in 100 Exercises, Wiley 2012). So the gain, the
-first resonance's frequency and damping, and the share of the response that adds to that resonance
-are fitted anew beside each effect, and without one.
+first resonance's frequency and damping, and a factor on the remainder of the response are nuisance
+parameters of every hypothesis, that without an effect included.
 """
 
 import numpy as np
@@ -24,9 +24,10 @@ from afm_scan_ros.core.effects.parameter_shift import (
     insert_gain,
     insert_resonance,
 )
-from afm_scan_ros.core.effects.vibration import Resonance, VibrationModel, first_resonance
+from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 
 
@@ -45,49 +46,46 @@ def _of_exact(known: ModelDiscrepancy) -> ModelDiscrepancy:
     return evolve(known, rms=np.full(len(known.rms), rms))
 
 
-def insert(chain: Chain, values: Array) -> Chain:
-    """Fit the vibration anew: its gain, its first resonance, and the share of what is beside that.
+def refitted(axis: AxisModel, values: Array) -> AxisModel:
+    """Return an axis of another gain, first resonance, and remainder of the response.
 
     Where there is no resonance the gain alone counts.
     """
+    gain, frequency, damping, remainder = values
+    chain = insert_gain(Chain(axis), np.array([gain]))
     try:
-        resonance = first_resonance(chain.model.vibration)
+        chain = chain.with_model(vibration=with_remainder(chain.model.vibration, remainder))
+        return insert_resonance(chain, np.array([frequency, damping])).model
     except InputError:
-        return insert_gain(chain, values[:1])
-    beside = with_beside(chain.model.vibration, resonance, float(values[3]))
-    chain = chain.with_model(vibration=beside)
-    return insert_resonance(insert_gain(chain, values[:1]), values[1:3])
+        return chain.model
 
 
-def with_beside(vibration: VibrationModel, resonance: Resonance, share: float) -> VibrationModel:
-    """Return G with a share of what adds to its first resonance, the gain at rest being kept.
+def with_remainder(vibration: VibrationModel, factor: float) -> VibrationModel:
+    """Multiply what G has besides its first resonance, its gain at rest being kept.
 
-    With G's denominator d = f r, f being the resonance's factor, n / d = a / f + b / r. Time is
-    scaled by the resonance, or coefficients span decades.
+    With G's denominator d = f r, f being the resonance's factor, n / d = a / f + b / r. The residue
+    at the resonance's pole gives a. Raises InputError where there is no resonance.
     """
-    rest, omega = np.array(resonance.rest), resonance.omega
-    if len(rest) == 1:
-        return vibration
-    scale = omega ** np.arange(len(vibration.denominator) - 1, -1.0, -1.0)
-    below = np.array(vibration.denominator) * scale
-    above = np.pad(vibration.numerator, (len(below) - len(vibration.numerator) - 1, 0)) * scale[1:]
-    factor = resonance.factor * omega ** np.array([2.0, 1.0, 0.0])
-    others = rest * scale[-len(rest) :]
-    size = len(above)
-    columns = [np.convolve(others, each) for each in np.eye(2)]
-    columns += [np.convolve(factor, each) for each in np.eye(len(others) - 1)]
-    rows = np.array([np.pad(each, (size - len(each), 0)) for each in columns])
-    parts = np.linalg.solve(rows.T, above)
-    parts[2:] *= share
-    changed = parts @ rows
-    return evolve(vibration, numerator=changed * (above[-1] / changed[-1]) / scale[1:])
+    resonance = first_resonance(vibration)
+    damping = resonance.damping
+    pole = resonance.omega * complex(-damping, np.sqrt(1.0 - damping**2))
+    slope = np.polyval(np.polyder(vibration.denominator), pole)
+    residue = np.polyval(vibration.numerator, pole) / slope
+    of_resonance = 2.0 * np.array([residue.real, -(residue * np.conj(pole)).real])
+    alone = np.polymul(of_resonance, resonance.rest)
+    changed = np.polyadd(factor * np.array(vibration.numerator), (1.0 - factor) * alone)
+    return evolve(vibration, numerator=changed * (vibration.numerator[-1] / changed[-1]))
 
 
-REFIT = EffectForm(
-    "",
-    ("vibration",),
-    (*GAIN, *RESONANCE, EffectParameter("share_beside", "1", 0.0, 2.0, 1e-6, neutral=1.0)),
-    insert,
-    example=(1.02, 0.98, 1.1, 0.5),
-)
-"""The vibration fitted anew, beside each effect and without one."""
+REMAINDER = EffectParameter("remainder_factor", "1", 0.0, 2.0, 1e-6, neutral=1.0)
+
+
+def refit_of(axis: AxisModel) -> EffectForm:
+    """Return the vibration of an axis as a form, which replaces the chain of that axis."""
+    return EffectForm(
+        "",
+        ("vibration",),
+        (*GAIN, *RESONANCE, REMAINDER),
+        lambda _, values: chain_of(refitted(axis, values)),
+        example=(1.02, 0.98, 1.1, 0.5),
+    )

@@ -286,8 +286,8 @@ class AxisFit:
         parts = []
         for k, left in enumerate(self.residuals()):
             record = self.records[k]
-            if record.block == record.finer:
-                noise = np.sqrt(record.finer) * noise_of(left)
+            if record.block == record.upsampling:
+                noise = np.sqrt(record.upsampling) * noise_of(left)
                 record = self.records[k] = evolve(record, noise=noise)
             noise = record.noise**2 / record.block
             parts.append((len(left), float(left @ left), noise, record.motion**2))

@@ -11,7 +11,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.measured_drive import without_noise
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
-from afm_scan_ros.core.intersample import HELD, INTERPOLATION, finer, read_between
+from afm_scan_ros.core.intersample import HELD, INTERPOLATION, read_between, upsampling
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 
@@ -20,9 +20,9 @@ from afm_scan_ros.core.types import Array
 class Signals:
     """Drive u (V) and displacement y (m), both (n,), that count from sample ``first`` on.
 
-    ``finer`` samples stand for each that was measured. ``rested`` is whether the scanner had long
-    rested at 0 V, depolarised; otherwise ``unknown`` says which of the unknown starts of a fit the
-    record has, where it has one. The drive is the ``recorded`` one of ``late`` samples earlier,
+    ``upsampling`` samples stand for each that was measured. ``rested`` is whether the scanner had
+    long rested at 0 V, depolarised; otherwise ``unknown`` says which of the unknown starts of a fit
+    the record has, where it has one. The drive is the ``recorded`` one of ``late`` samples earlier,
     where it is late. ``noise`` (m) is the standard deviation of a sample, ``tones`` (Hz) are sines
     in the displacement. Stretches of blocks, of one row of derivatives each, have ``edges`` in
     samples.
@@ -41,7 +41,7 @@ class Signals:
     unknown: int | None = None
     late: int = 0
     recorded: Array | None = None
-    finer: int = 1
+    upsampling: int = 1
 
     @property
     def given(self) -> Array:
@@ -51,7 +51,7 @@ class Signals:
     @property
     def sampled(self) -> float:
         """Time between measured samples, s."""
-        return self.finer * self.period
+        return self.upsampling * self.period
 
     @property
     def blocks(self) -> int:
@@ -162,7 +162,7 @@ def signals_of(
     is known is left out where the scanner ``remembers``, unless that is most of the record.
     ``half_range`` is that of the operator (V).
     """
-    every, (measured,) = finer(record.intersample), record.displacement.T
+    every, (measured,) = upsampling(record.intersample), record.displacement.T
     if len(measured) < settings.fewest_blocks:
         raise InputError(
             f"{record.name}: holds only {len(measured)} samples: give a record of"
@@ -180,7 +180,7 @@ def signals_of(
     edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
     period, begun = record.sample_period / every, record.depolarised
     every_sample = record.name, drive, displacement, period
-    return Signals(*every_sample, block, first, begun, noise, edges, finer=every)
+    return Signals(*every_sample, block, first, begun, noise, edges, upsampling=every)
 
 
 def _later(drive: Array, samples: int) -> Array:

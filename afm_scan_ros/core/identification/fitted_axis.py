@@ -107,8 +107,10 @@ def identify_axis(
     progress("what the records tell of each effect")
     told = Knowledge.of(fit)
     effects = told.effects()
+    operator = "one state" if isinstance(fit.layout.operator, OneState) else "plays"
     if linear:
         effects = evolve(effects, hysteresis=EffectStatus(Status.ASSUMED))
+        operator = "none"
     model = evolve(model_of(fit), effects=effects)
     progress("validating")
     left_out = [_held_out(model, one, axis) for one in held_out]
@@ -121,7 +123,7 @@ def identify_axis(
         known.append(of_fitted(error, fit.discrepancy))
     return FittedAxis(
         model=evolve(model.also_known(known), spread=spread),
-        operator="none" if linear else _operator(fit),
+        operator=operator,
         discrepancy=fit.discrepancy,
         deviation=deviation,
         records=tuple(_fitted_records(fit)),
@@ -134,10 +136,6 @@ def identify_axis(
         ),
         validations=tuple(validations),
     )
-
-
-def _operator(fit: AxisFit) -> str:
-    return "one state" if isinstance(fit.layout.operator, OneState) else "plays"
 
 
 def _fitted_records(fit: AxisFit) -> Iterator[FittedRecord]:
