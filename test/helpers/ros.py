@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
+from afm_scan_ros.nodes import shared_memory
 from afm_scan_ros.nodes.topics import NodeTopic
 
 PATIENCE = 120.0
@@ -19,7 +20,11 @@ PATIENCE = 120.0
 
 @contextmanager
 def joined(*pairs: str, **parameters: object) -> Iterator[None]:
-    """Join the domain with parameters, NAME:=VALUE or named, for all nodes of this process."""
+    """Join the domain with parameters, NAME:=VALUE or named, for all nodes of this process.
+
+    What nodes that were killed have left in shared memory may hang it, and is cleared before.
+    """
+    shared_memory.clear()
     pairs += tuple(f"{name}:={json.dumps(value)}" for name, value in parameters.items())
     words = [word for pair in pairs for word in ("-p", pair)]
     rclpy.init(args=["test", "--ros-args", *words], signal_handler_options=SignalHandlerOptions.NO)

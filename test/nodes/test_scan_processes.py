@@ -89,6 +89,7 @@ def test_a_stop_ends_the_scan_smoothly_at_rest(
 ) -> None:
     started = nodes([SOURCE, *CONSUMERS], time_scale=5.0)
     until(lambda: operator.samples.get("piezoscanner_sim", 0) > 0, operator)
+    until(operator.stop.service_is_ready, operator)  # or the request has nobody to reach
     answer = operator.stop.call_async(Trigger.Request())
     until(answer.done, operator)
     assert answer.result().success

@@ -190,7 +190,10 @@ def _names(seed: int, turn: int) -> tuple[str, ...]:
 
 
 def _added(effect: DrawnEffect, course: Course, drive: Array, goal: float) -> Array | None:
-    """What the least size of an effect adds (m) whose rms is ``goal`` (m), where there is one."""
+    """What the least size of an effect adds (m) whose rms is ``goal`` (m), where there is one.
+
+    There is none where the least that an effect can add is more.
+    """
     healthy = course.moved(drive)
     if goal > MOST * float(np.std(healthy)):
         return None
@@ -199,6 +202,8 @@ def _added(effect: DrawnEffect, course: Course, drive: Array, goal: float) -> Ar
         return float(np.std(effect.change(course, drive, size) - healthy)) - goal
 
     size = SMALLEST
+    if missing(size) > 0.0:
+        return None
     while missing(GROWTH * size) < 0.0:
         size *= GROWTH
         if size > effect.largest:
