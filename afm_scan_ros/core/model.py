@@ -62,6 +62,10 @@ class Status(Enum):
     UNKNOWN = "unknown"
 
 
+CONFIDENT = 1.96
+"""Standard deviations to either end of a 95 % interval of a normal variable."""
+
+
 @frozen
 class ParameterInterval:
     """95 % interval of a parameter, in ``unit``; an open end is None."""

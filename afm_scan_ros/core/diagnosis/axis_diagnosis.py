@@ -20,7 +20,6 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter, with_base_parameters
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
@@ -29,7 +28,7 @@ from afm_scan_ros.core.diagnosis.structure import refit_of
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
-from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.model import CONFIDENT, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array, ProgressCallback

@@ -17,10 +17,10 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.effects.parameter_shift import insert_resonance
 from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 
 NEGLIGIBLE = 0.01

@@ -17,11 +17,11 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import csd, welch
 
+from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import Array, floats
 
-CONFIDENT = 1.96
 MOST = 2**15
 """Largest number of samples; a longer record is averaged over equal stretches."""
 LAGS = 120

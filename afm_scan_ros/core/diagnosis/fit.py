@@ -15,12 +15,12 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 
 ROUNDS = 30
 TOLERANCE = 1e-2
 """Change of the cost in nats that ends a fit; competing models differ by far more."""
-CONFIDENT = 1.96
 ALL = slice(None)
 STEP_SHARES = (1.0, 0.2)
 SECANTS = 0.06, 0.02, 0.006, 0.002

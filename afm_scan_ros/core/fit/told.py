@@ -17,6 +17,7 @@ from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.uncertainty import information, inverse, of_records
 from afm_scan_ros.core.model import (
+    CONFIDENT,
     BaseEffects,
     EffectStatus,
     ParameterInterval,
@@ -26,9 +27,6 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
-
-CONFIDENT = 1.96
-"""Standard deviations to either end of a 95 % interval of a normal variable."""
 
 
 @frozen(eq=False)

@@ -29,8 +29,8 @@ import scipy
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, FOUND
-from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM
+from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.survey.recording import QuantityEstimate, Recording
 

@@ -20,7 +20,6 @@ from attrs import frozen
 from afm_scan_ros.core.bands import bounds, rms_by_band
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.fit import CONFIDENT
 from afm_scan_ros.core.diagnosis.likelihood import LinearResidual
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.parameter_shift import (
@@ -33,6 +32,7 @@ from afm_scan_ros.core.effects.parameter_shift import (
 )
 from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 
 Interval = tuple[float, float]

@@ -1,8 +1,8 @@
 """Samples that are no measurement: lost, repeated, held, disturbed, or of a sensor at rest.
 
-A linear predictor, fitted to the record itself, predicts each sample from those before it and
-from the drive. Mechanics, hysteresis and sensor noise keep to it, whatever they are like; what a
-recorder or a converter does to single samples does not.
+A predictor, fitted to the record itself, predicts each sample from those before it, their squares
+and cubes, and the drive. Mechanics, springs that harden or soften, hysteresis and sensor noise keep
+to it, whatever they are like; what a recorder or a converter does to single samples does not.
 """
 
 from collections.abc import Iterator
@@ -10,12 +10,15 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.special import erf
 
 from afm_scan_ros.core.types import Array
 
 ORDER = 12
 """Samples that a prediction stands on."""
+POWERS, CURVED = (2, 3), 6
+"""Powers of the displacement that a prediction stands on too, and of how many samples."""
 ROWS = 50_000
 """Predictions that fit the predictor, at most."""
 RESOLVED = 0.01
@@ -63,10 +66,16 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     """
     given, moved = (np.diff(signal) / np.std(np.diff(signal)) for signal in (drive, displacement))
     past, driven = (sliding_window_view(signal, ORDER + 1) for signal in (moved, given))
+    curved = _curved(displacement)
     rows = np.linspace(0, len(past) - 1, min(ROWS, len(past))).astype(int)
-    predictor = _weights(np.hstack([past[rows, :-1], driven[rows]]), past[rows, -1])
-    own, other = np.append(predictor[:ORDER], -1.0), predictor[ORDER:]
+    regressors = [past[rows, :-1], driven[rows], *(each[rows] for each in curved)]
+    predictor = np.split(
+        _weights(np.hstack(regressors), past[rows, -1]),
+        np.cumsum([each.shape[1] for each in regressors])[:-1],
+    )
+    own, other = np.append(predictor[0], -1.0), predictor[1]
     error = np.convolve(moved, own[::-1], "valid") + np.convolve(given, other[::-1], "valid")
+    error += sum(each @ weights for each, weights in zip(curved, predictor[2:], strict=True))
     usual = np.append(_weights(driven[rows, :-1], driven[rows, -1]), -1.0)
     unforeseen = np.abs(np.convolve(given, usual[::-1], "valid"))
     unforeseen = np.concatenate([np.abs(given[:ORDER]), unforeseen])
@@ -75,13 +84,50 @@ def _prediction_error(drive: Array, displacement: Array) -> tuple[Array, Array]:
     return np.asarray(scale * error), np.asarray(scale * explained)
 
 
+def _curved(displacement: Array) -> list[Array]:
+    """Differences (n, CURVED) of each power of the displacement (m) before each prediction."""
+    centred = displacement - np.mean(displacement)
+    steps = (np.diff((centred / np.max(np.abs(centred))) ** power) for power in POWERS)
+    return [
+        sliding_window_view(step / np.std(step), ORDER + 1)[:, ORDER - CURVED : -1]
+        for step in steps
+    ]
+
+
 def _weights(past: Array, now: Array) -> Array:
     return np.asarray(np.linalg.lstsq(past, now, rcond=RESOLVED)[0])
 
 
 def _usual(error: Array, displacement: Array) -> Array:
-    """Return the errors' usual size about each, and at least what the sensor resolves."""
+    """Return the errors' usual size about each, and at least what the sensor resolves.
+
+    About each are those near it in time, those of motion as far from the mean, and those of motion
+    as fast: what the predictor does not know of the scanner grows with both.
+    """
     size = np.abs(error)
+    far = _largest(np.abs(displacement - np.mean(displacement))[1:])
+    fast = _largest(np.abs(np.diff(displacement)))
+    each = _usual_in_time(size, displacement), _alike(size, far), _alike(size, fast)
+    return np.asarray(np.max(each, axis=0))
+
+
+def _largest(size: Array) -> Array:
+    """Return the largest of the samples that each prediction stands on, and of its own."""
+    return np.asarray(np.max(sliding_window_view(size, ORDER + 1), axis=1))
+
+
+def _alike(size: Array, of: Array) -> Array:
+    """Return the usual size (n,) of those whose value ``of`` (n,) is nearest to each one's.
+
+    It is at most that of any larger value, or samples that are held would be usual at rest.
+    """
+    order, usual = np.argsort(of), np.empty(len(size))
+    found = NORMAL * median_filter(size[order], BLOCK, mode="reflect")
+    usual[order] = np.minimum.accumulate(found[::-1])[::-1]
+    return np.asarray(usual)
+
+
+def _usual_in_time(size: Array, displacement: Array) -> Array:
     whole = len(size) // BLOCK * BLOCK
     local = NORMAL * np.median(size[:whole].reshape(-1, BLOCK), axis=1)
     near = np.max([np.roll(local, shift) for shift in (-1, 0, 1)], axis=0)
