@@ -94,10 +94,18 @@ def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array 
 
 
 def _driven(model: ScannerModel, drive: Trace) -> dict[str, Array]:
-    """Displacement (n,) in m of each axis due to the drive, without the model's creep at 0 V."""
-    still = Trace(0, drive.sample_period, np.zeros_like(drive.x), np.zeros_like(drive.y))
+    """Displacement (n,) in m of each axis due to the drive, without the model's creep at rest."""
+    at_rest = {axis: np.full_like(drive.axis(axis), _rest(model, axis)) for axis in AXES}
+    still = Trace(0, drive.sample_period, **at_rest)
     moved, rest = predict(model, drive), predict(model, still)
     return {axis: moved.axis(axis) - rest.axis(axis) for axis in AXES}
+
+
+def _rest(model: ScannerModel, axis: str) -> float:
+    """Drive (V) at which a scanner rests: 0 V, or the nearest that was identified."""
+    if axis not in model.axes:
+        return 0.0
+    return float(np.clip(0.0, *model.axis(axis).hysteresis.forward.drive_range))
 
 
 def _refuse_unlike(where: str, predicted: Array, measured: Array, least: float) -> None:

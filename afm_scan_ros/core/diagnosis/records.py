@@ -14,6 +14,7 @@ from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
 from afm_scan_ros.core.intersample import HELD, held_voltages, read_between, upsampling
+from afm_scan_ros.core.model import Range
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, floats
 
@@ -115,9 +116,15 @@ class InitialState:
         progress = np.arange(SAMPLES_PER_MOVE * (len(stops) - 1)) / SAMPLES_PER_MOVE
         return np.asarray(np.interp(progress, np.arange(len(stops)), stops))
 
-    def played(self, cascade: Cascade, drive: Array) -> Array:
-        """Output (n,) of the elements up to the hysteresis from this state on, less that before."""
+    def played(
+        self, cascade: Cascade, drive: Array, identified: Range = (-np.inf, np.inf)
+    ) -> Array:
+        """Output (n,) of the elements up to the hysteresis from this state on, less that before.
+
+        A drive before the record that lies beyond the ``identified`` range (V) is at its limit.
+        """
         state, path = cascade.at_rest(), np.zeros(1) if self.blank else self.path()
+        path = np.clip(path, *identified)
         settled, before = cascade.apply(state, path)
         begun = state if self.blank else settled
         return np.asarray(cascade.apply(begun, drive)[1] - before[-1])
@@ -146,6 +153,7 @@ class Playback:
         chain = chain.of_record(self.view.number)
         view = self.view
         period, signal, changed = view.sample_period / view.upsampling, view.voltages, False
+        identified = chain.model.hysteresis.forward.drive_range
         for number, stage in enumerate(chain.stages()):
             changed = changed or number not in self._cache or self._cache[number][0] != stage
             if changed:
@@ -153,7 +161,7 @@ class Playback:
                 played = (
                     cascade.apply(cascade.at_rest(), met)[1]
                     if number
-                    else self.initial_state.played(cascade, met)
+                    else self.initial_state.played(cascade, met, identified)
                 )
                 self._cache[number] = stage, played
             signal = self._cache[number][1]

@@ -20,8 +20,9 @@ class BeyondRangeError(SampleError):
     def __init__(self, sample: int, value: float, limit: float) -> None:
         super().__init__(
             sample,
-            f"{value:.6g} V is beyond the identified range's limit of {limit + 0.0:.6g} V: scan a"
-            " smaller range, more slowly or farther from that limit, or identify a larger range",
+            f"{value:.6g} V is {abs(value - limit):.2g} V beyond the identified range's limit of"
+            f" {limit + 0.0:.6g} V: scan a smaller range, more slowly or farther from that limit,"
+            " or identify a larger range",
         )
         self.value = value
         self.limit = limit
