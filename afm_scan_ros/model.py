@@ -21,6 +21,7 @@ from afm_scan_ros.core.arguments import (
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
+from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import SHARE, extended
 from afm_scan_ros.core.intersample import HELD, upsampling, voltages_of
@@ -28,7 +29,7 @@ from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
 from afm_scan_ros.core.prediction_error import standard_deviation
 from afm_scan_ros.core.scanner import predict
-from afm_scan_ros.core.types import Array, Trace, channels_of, trace_of
+from afm_scan_ros.core.types import AXES, Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.report.effect_status_text import unknown_effects
@@ -217,6 +218,7 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         given = self._trace("drive", drive, sample_period)
+        given = self._led(given) if intersample == HELD else given
         voltages, every = voltages_of(given, intersample), upsampling(intersample)
         model = extended(self.scanner, voltages, share) if share else self.scanner
         try:
@@ -232,6 +234,16 @@ class Model:
             return self._like(drive, moved)
         deviation = standard_deviation(self.scanner, given, moved, share or SHARE, intersample)
         return self._like(drive, moved), self._like(drive, deviation)
+
+    def _led(self, drive: Trace) -> Trace:
+        """Return a drive (V) as for a displacement that is read just before its updates."""
+        ahead = {
+            name: led(drive.axis(name))
+            for name in self.scanner.axes
+            if self.scanner.axis(name).reads_after
+        }
+        both = (ahead.get(name, drive.axis(name)) for name in AXES)
+        return Trace(drive.first_sample, drive.sample_period, *both)
 
     def invert(
         self,

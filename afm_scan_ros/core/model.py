@@ -272,6 +272,11 @@ class AxisModel:
         return self.vibration if self.sensor is None else self.sensor.read(self.vibration)
 
     @property
+    def reads_after(self) -> bool:
+        """Whether the sensor reads the displacement after the drive's updates."""
+        return self.sensor is not None and self.sensor.reads_after
+
+    @property
     def model_discrepancies(self) -> tuple[ModelDiscrepancy, ...]:
         """All that is known of the model's error; empty where nothing is."""
         return (

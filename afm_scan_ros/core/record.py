@@ -48,8 +48,9 @@ class Record:
     drive
         V, shape (n,) or (n, channels); kept as (n, channels).
     displacement
-        m, as long, measured just before each update of the drive. Its zero is taken from the record
-        itself, so that a sensor's offset does not matter.
+        m, as long, measured just before each update of the drive, or at the end of the sample: a
+        fit tells which, where it matters. Its zero is taken from the record itself, so that a
+        sensor's offset does not matter.
     sample_period
         s.
     axes

@@ -8,14 +8,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import CoupledSystem, sum_of
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.registry import effect_type
+from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.intersample import HELD
 from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
@@ -160,6 +163,20 @@ def _applied(
     for name, cascade in cascades.items():
         states[name], moved[name] = cascade.apply(before[name], given.axis(name))
     return states, Trace(given.first_sample, given.sample_period, **moved)
+
+
+def synchronised(model: ScannerModel, record: Record) -> Record:
+    """Return a record as one of a displacement that is read just before the drive's updates.
+
+    Nodes read so; other records are read as those were that a model was identified from.
+    """
+    if record.scan is not None or record.intersample != HELD:
+        return record
+    drive = record.drive.copy()
+    for channel, axis in enumerate(record.axes):
+        if axis in model.axes and model.axis(axis).reads_after:
+            drive[:, channel] = led(drive[:, channel])
+    return evolve(record, drive=drive)
 
 
 def predict(model: ScannerModel, drive: Trace) -> Trace:

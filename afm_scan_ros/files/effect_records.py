@@ -90,6 +90,7 @@ class SensorRecord:
     order: int = 0
     corner: float | None = field(default=None, metadata={"suffix": "_hz"})
     delay: float = field(default=0.0, metadata={"suffix": "_s"})
+    reads_after: bool = False
 
 
 def hysteresis_from(given: HysteresisRecord, arrays: Archive) -> HysteresisModel:

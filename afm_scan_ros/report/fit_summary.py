@@ -21,9 +21,6 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.NotConverged: "The fit has not converged: the likelihood may still grow by"
     " {remaining:.3g} nat, so the intervals do not hold. Give further records, of other sizes and"
     " rates.",
-    found.ReadAfterUpdate: "The displacement in {record} follows a step of its drive within that"
-    " sample, so each was taken as read after the drive's update. The model predicts what is read"
-    " just before it: compare its predictions with the next sample.",
     found.UncertainScan: "The records tell a scan over the whole drive to {share:.1%} of its range"
     " only (one standard deviation). Add triangles or loops over the whole drive, of several"
     " amplitudes.",
@@ -35,6 +32,17 @@ SENTENCES: dict[type[found.Finding], str] = {
 def finding_text(finding: found.Finding) -> str:
     """Say what was found and what to do about it."""
     return SENTENCES[type(finding)].format(**asdict(finding))  # type: ignore[arg-type] # all are attrs
+
+
+@finding_text.register
+def _(finding: found.ReadAfterUpdate) -> str:
+    read = f"The displacement in {finding.record} was read after each update of the drive,"
+    if finding.predicted:
+        return f"{read} and the model predicts what is read so."
+    return (
+        f"{read} which its steps show. The model predicts what is read just before, as in other"
+        " records: compare its predictions with the next sample."
+    )
 
 
 @finding_text.register

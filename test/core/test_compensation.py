@@ -191,7 +191,7 @@ def test_whole_is_the_blocks_together() -> None:
 
 
 def test_the_identified_range_is_named_with_sample_and_axis() -> None:
-    with pytest.raises(ScanError, match=r"^sample \d+, axis y: .* V is beyond the ident") as caught:
+    with pytest.raises(ScanError, match=r"^sample \d+, axis y: .* V beyond the ident") as caught:
         run(COMPENSATION, WAVE, 30.0 * WAVE, [0, 400, 800, TOTAL])
     sample = int(str(caught.value).split()[1].rstrip(","))
     assert 30.0 * WAVE[sample] > 10e-6  # where the target is large, not where the block begins

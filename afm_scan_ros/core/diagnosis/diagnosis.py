@@ -45,6 +45,7 @@ from afm_scan_ros.core.extension import with_overshoot
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
+from afm_scan_ros.core.scanner import synchronised
 from afm_scan_ros.core.types import ProgressCallback
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
@@ -134,6 +135,8 @@ def diagnose(
     """
     if not observations:
         raise InputError("no record is given: give one bag or more")
+    observations = [synchronised(model, each) for each in observations]
+    healthy = [synchronised(model, each) for each in healthy]
     unlike = tuple(unlike_healthy(model, healthy))
     model = with_healthy(model, healthy)
     believed = counted_exact(model) if structure else model

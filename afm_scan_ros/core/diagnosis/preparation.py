@@ -85,8 +85,8 @@ def _candidate_states(limits: tuple[float, float], rest: float) -> Iterator[Init
     for limit, opposite in (limits, limits[::-1]):
         for size in np.linspace(0.0, 1.0, LEVELS + 1)[1:]:
             for share in INNER:
-                inner = (share * size * opposite,) if share else ()
-                yield InitialState((size * limit, *inner), rest)
+                turns = np.array([size * limit, *((share * size * opposite,) if share else ())])
+                yield InitialState(np.clip(turns, *limits), rest)
 
 
 def _refined_state(

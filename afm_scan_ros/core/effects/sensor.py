@@ -17,19 +17,23 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.types import Array
 
 
 @frozen
 class SensorModel:
     """A low-pass of an even ``order`` and a ``corner`` (Hz), and a ``delay`` (s).
 
-    An order of zero is none, without a corner. Raises InputError where the order is odd or
-    negative, the corner not positive, or the delay negative.
+    An order of zero is none, without a corner. The displacement is read just before the drive's
+    updates, or where it ``reads_after`` them, at the end of the time for which each voltage is
+    held. Raises InputError where the order is odd or negative, the corner not positive, or the
+    delay negative.
     """
 
     order: int = field(default=0, converter=int)
     corner: float | None = field(default=None, converter=optional(float))
     delay: float = field(default=0.0, converter=float)
+    reads_after: bool = False
 
     def __attrs_post_init__(self) -> None:
         none, corner = self.order == 0 and self.corner is None, self.corner or 0.0
@@ -48,6 +52,8 @@ class SensorModel:
             parts.append(f"a low-pass of order {self.order} at {self.corner:.4g} Hz")
         if self.delay:
             parts.append(f"a delay of {self.delay:.4g} s")
+        if self.reads_after:
+            parts.append("readings after the drive's updates")
         return " and ".join(parts)
 
     @property
@@ -71,3 +77,12 @@ class SensorModel:
         denominator = np.polymul(vibration.denominator, low_pass)
         delay = vibration.delay + self.delay
         return VibrationModel(vibration.numerator, tuple(denominator), delay)
+
+
+def led(drive: Array) -> Array:
+    """Return a drive (V), (n, ...), a sample ahead; the last voltage is held.
+
+    It moves a displacement that is read just before the drive's updates as the drive given moves
+    one that is read after them.
+    """
+    return np.concatenate([drive[1:], drive[-1:]])

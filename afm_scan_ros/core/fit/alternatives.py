@@ -77,6 +77,33 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
     return fit
 
 
+def with_told_reading(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
+    """Return a fit whose records were read after their drives' updates, where these show it.
+
+    Without any lag such a fit has to explain as much as one of lags that reads before the updates,
+    or clearly more where the lag of that one is one: a negative lag is none of a scanner. A fit of
+    modes is as good either way, and records of drives that are not held have no updates.
+    """
+    if all(one.ahead for one in fit.records):
+        return read_after(fit)
+    if not (fit.lags_alone and all(one.held for one in fit.records)):
+        return fit
+    groups = (*fit.layout.operator.parts, *LINEAR, "rest", "memory")
+    before, name = copy(fit), "reading after the drive's updates"
+    before.records = list(fit.records)
+    after = partial(read_after, without_lags(fit))
+    _, lead = _compared(before, after, progress, name, groups)
+    chance = fit.layout.settings.mode_chance
+    return read_after(fit) if lead > np.copysign(chance, before.mean_lag) else fit
+
+
+def read_after(fit: AxisFit) -> AxisFit:
+    """Return a fit of records that were read after their drives' updates."""
+    layout = evolve(fit.layout, reads_after=True)
+    records = [one.read_after(layout.operator.half, layout.settings) for one in fit.records]
+    return AxisFit(layout, records, fit.gain, fit.theta.copy(), fit.discrepancy, fit.scales)
+
+
 def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one without lags where these are all that there is of its vibration.
 

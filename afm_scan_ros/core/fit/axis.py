@@ -7,7 +7,12 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.alternatives import better, with_rest, with_told_lags
+from afm_scan_ros.core.fit.alternatives import (
+    better,
+    with_rest,
+    with_told_lags,
+    with_told_reading,
+)
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
 from afm_scan_ros.core.fit.directions import lost_by
 from afm_scan_ros.core.fit.estimator import AxisFit
@@ -71,6 +76,7 @@ def fit_axis(
         fit.gain *= found.gain
         settle(fit, settings.most_steps, VIBRATION)
     refuse_unlike(fit)
+    fit = with_told_reading(fit, progress)
     if linear:
         return _of_linear(fit, progress)
     progress("fitting the hysteresis by plays")

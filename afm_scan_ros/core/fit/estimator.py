@@ -123,8 +123,12 @@ class AxisFit:
 
         What rings between slow samples shows in those behind a step, and looks like such lags.
         """
-        lag = float(self.theta[self.layout.parts["lags"]] @ self.layout.lags)
-        return self.lags_alone and lag < self.shortest
+        return self.lags_alone and self.mean_lag < self.shortest
+
+    @property
+    def mean_lag(self) -> float:
+        """Mean of the lags, by their weights, s."""
+        return float(self.theta[self.layout.parts["lags"]] @ self.layout.lags)
 
     @property
     def sufficient(self) -> bool:

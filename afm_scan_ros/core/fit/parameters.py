@@ -45,7 +45,8 @@ class Layout:
     ``lags`` (s), of which the first is faster than any record shows, and creep's
     ``time_constants`` (s) have fixed places. Last come where depolarised rest is, and what each
     record of an unknown start remembers. Where the sensor is ``delayed``, it is by ``least_delay``
-    (s) at least. Where it is ``linear``, the operator stays a straight line, and V has the gain.
+    (s) at least. It ``reads_after`` each update of the drive, or just before. Where it is
+    ``linear``, the operator stays a straight line, and V has the gain.
     """
 
     operator: Operator
@@ -57,6 +58,7 @@ class Layout:
     sensor_order: int = 0
     delayed: bool = False
     least_delay: float = 0.0
+    reads_after: bool = False
     linear: bool = False
 
     @cached_property
@@ -171,10 +173,10 @@ class Layout:
 
     def sensor_of(self, theta: Array) -> SensorModel | None:
         """Return the sensor, of which θ holds the logarithm of the corner in Hz, and the delay."""
-        if not (self.sensor_order or self.delayed):
+        if not (self.sensor_order or self.delayed or self.reads_after):
             return None
         corner = float(np.exp(theta[self.parts["sensor"].start])) if self.sensor_order else None
-        return SensorModel(self.sensor_order, corner, self.delay_of(theta))
+        return SensorModel(self.sensor_order, corner, self.delay_of(theta), self.reads_after)
 
     def delay_of(self, theta: Array) -> float:
         """Return the delay of the sensor, s."""

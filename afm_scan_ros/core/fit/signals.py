@@ -7,6 +7,7 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy.fft import irfft, rfft
 
+from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.measured_drive import without_noise
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -23,9 +24,10 @@ class Signals:
     ``upsampling`` samples stand for each that was measured. ``rested`` is whether the scanner had
     long rested at 0 V, depolarised; otherwise ``unknown`` says which of the unknown starts of a fit
     the record has, where it has one. The drive is the ``recorded`` one of ``late`` samples earlier,
-    where it is late. ``noise`` (m) is the standard deviation of a sample, ``tones`` (Hz) are sines
-    in the displacement. Stretches of blocks, of one row of derivatives each, have ``edges`` in
-    samples.
+    where it is late. It is ``held`` between samples where the record says so, and a sample
+    ``ahead`` of the record's where the displacement was read after each update of the drive.
+    ``noise`` (m) is the standard deviation of a sample, ``tones`` (Hz) are sines in the
+    displacement. Stretches of blocks, of one row of derivatives each, have ``edges`` in samples.
     """
 
     name: str
@@ -42,6 +44,8 @@ class Signals:
     late: int = 0
     recorded: Array | None = None
     upsampling: int = 1
+    held: bool = True
+    ahead: bool = False
 
     @property
     def given(self) -> Array:
@@ -133,6 +137,14 @@ class Signals:
         moved = evolve(self, drive=drive, edges=edges, first=first)
         return evolve(moved, late=samples, recorded=self.given)
 
+    def read_after(self, half_range: float, settings: FitSettings) -> "Signals":
+        """Return the record as one whose displacement was read after its drive's updates."""
+        if self.ahead:
+            return self
+        drive = led(self.drive)
+        given = drive, self.displacement, self.noise, self.block, self.first, half_range, settings
+        return evolve(self, drive=drive, edges=edges_of(*given), ahead=True)
+
     def without_drive_noise(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record with its drive less the noise with which that was measured."""
         quiet = without_noise(self.given, half_range, settings)
@@ -180,7 +192,18 @@ def signals_of(
     edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
     period, begun = record.sample_period / every, record.depolarised
     every_sample = record.name, drive, displacement, period
-    return Signals(*every_sample, block, first, begun, noise, edges, upsampling=every)
+    held = record.intersample == HELD
+    return Signals(
+        *every_sample,
+        block,
+        first,
+        begun,
+        noise,
+        edges,
+        upsampling=every,
+        held=held,
+        ahead=held and reads_after(record.drive[:, 0], measured, settings),
+    )
 
 
 def _later(drive: Array, samples: int) -> Array:
@@ -226,7 +249,7 @@ def in_step(record: Record, settings: FitSettings) -> Array:
     drive, displacement = record.signals(record.axes[0])
     if record.intersample != HELD or not reads_after(drive, displacement, settings):
         return drive
-    return np.append(drive[1:], drive[-1])
+    return led(drive)
 
 
 def noise_of(signal: Array) -> float:

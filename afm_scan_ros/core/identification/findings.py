@@ -40,9 +40,10 @@ class NotConverged(Finding):
 
 @frozen
 class ReadAfterUpdate(Finding):
-    """A record whose displacement follows a step of its drive within that sample."""
+    """A record read after each update of its drive; whether the model predicts what is read so."""
 
     record: str
+    predicted: bool
 
 
 @frozen

@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
+from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.directions import scans
@@ -119,7 +120,7 @@ def identify_axis(
     deviation = _of_scan(model, spread, fit)
     known = [one.model_discrepancy for one in validations]
     for one in fitting:
-        error = validate_from(model, _in_step(one.axis(axis)), 0).model_discrepancy
+        error = validate_from(model, _in_step(model, one.axis(axis)), 0).model_discrepancy
         known.append(of_fitted(error, fit.discrepancy))
     return FittedAxis(
         model=evolve(model.also_known(known), spread=spread),
@@ -129,7 +130,7 @@ def identify_axis(
         records=tuple(_fitted_records(fit)),
         direct=_direct_misfit(model, [one.drive for one in fit.records]),
         warnings=(
-            *_read_after(records, axis),
+            *_read_after(model, records, axis),
             *_of_fit(fit),
             *_uncertain(deviation),
             *_of_validation(held_out, validations),
@@ -169,7 +170,7 @@ def error_of(model: AxisModel, record: Record, axis: str) -> Validation:
 
 
 def _held_out(model: AxisModel, record: Record, axis: str) -> HeldOut:
-    given = _in_step(record.axis(axis))
+    given = _in_step(model, record.axis(axis))
     first = known_from(given.drive[:, 0], DEFAULT_SETTINGS, depolarised=record.depolarised)
     return HeldOut(given, first, validate_from(model, given, first))
 
@@ -186,16 +187,20 @@ def _of_scan(model: AxisModel, spread: Spread, fit: AxisFit) -> float:
     return float(np.sqrt(known + discrepancy(spread, moved, period) ** 2) / np.ptp(moved))
 
 
-def _in_step(record: Record) -> Record:
+def _in_step(model: AxisModel, record: Record) -> Record:
     """Return a record of one axis as it were read just before its drive's updates."""
+    if model.reads_after and record.intersample == HELD:
+        return evolve(record, drive=led(record.drive))
     return evolve(record, drive=in_step(record, DEFAULT_SETTINGS))
 
 
-def _read_after(records: Sequence[Record], axis: str) -> Iterator[Finding]:
+def _read_after(model: AxisModel, records: Sequence[Record], axis: str) -> Iterator[Finding]:
     """Yield the records that were read after their drive's updates."""
     for one in records:
-        if one.intersample == HELD and reads_after(*one.signals(axis), DEFAULT_SETTINGS):
-            yield ReadAfterUpdate(one.name)
+        if one.intersample == HELD and (
+            model.reads_after or reads_after(*one.signals(axis), DEFAULT_SETTINGS)
+        ):
+            yield ReadAfterUpdate(one.name, model.reads_after)
 
 
 def _of_fit(fit: AxisFit) -> Iterator[Finding]:

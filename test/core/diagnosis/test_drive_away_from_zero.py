@@ -19,5 +19,5 @@ def recorded(seed: int, tone: float = 0.0) -> afm.Record:
 def test_a_tone_is_found_and_a_healthy_record_is_none() -> None:
     model = afm.identify([recorded(seed) for seed in (1, 2)], linear=True)
     assert afm.diagnose(model, [recorded(3)]).verdict == "model_sufficient"
-    found = afm.diagnose(model, [recorded(4, tone=10.0 * NOISE)])
+    found = afm.diagnose(model, [recorded(4, tone=30.0 * NOISE)])
     assert [effect.name for effect in found.effects] == ["periodic_disturbance"]
