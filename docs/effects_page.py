@@ -6,13 +6,15 @@
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite
 from pathlib import Path
 
 from afm_scan_ros.core.effects.effect_type import EffectParameter, EffectType
 from afm_scan_ros.core.effects.registry import EFFECTS
 
 FURTHER = re.compile("_([3-9]|[12][0-9])$")
-"""Ends of the names of numbered parameters that stand in the row of the second."""
+"""Ends of the names of numbered parameters, which are stated with the second."""
+SENTENCE = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z`])")
 FEEDBACK = "feedback"
 REMEDIES = {"feedforward": "removes it", "partly": "removes it in part", "none": "cannot remove it"}
 INTRODUCTION = """\
@@ -20,9 +22,10 @@ INTRODUCTION = """\
 
 <!-- Written by `python docs/effects_page.py docs/reference/effects.md`. -->
 
-Each effect is one file in `afm_scan_ros/core/effects/`. Hysteresis, vibration and creep are the
-base model, which `afm-scan identify` identifies. The others extend it. `afm-scan diagnose` fits
-them to a residual, and a model file lists those that were found on an axis:
+Look an effect up here when a diagnosis names it, or when you add it to a model yourself. Creep,
+hysteresis and vibration form the base model, which `afm-scan identify` identifies. The other
+effects extend it: `afm-scan diagnose` fits them to a residual, and a model file lists those that
+were found on an axis.
 
 ```yaml
 added:
@@ -37,28 +40,27 @@ The signal passes the places of the chain in this order:
     drive u → [drive] → hysteresis → F → vibration → creep
             → + [coupling] → [output] → displacement x
 
-The `hysteresis` inverse includes the effects before the hysteresis, and the `vibration` inverse
-those in the vibration. Any inverse includes those behind creep. The order of the list matters: an
-effect acts on the model with all effects that are listed before it. A diagnosis tries the orders.
+The `hysteresis` inverse includes the effects before the hysteresis, the `vibration` inverse those
+in the vibration, and any inverse those after creep. Each effect acts on the model with all effects
+listed before it, so their order matters; a diagnosis tries the orders.
 
-Bounds are those of a reference scanner: 4 V to either side, 22.09 µm at 4 V, and a first resonance
-of 454 Hz. For another scanner lengths scale with the displacement at its largest drive, voltages
-with that drive, and times with the period of its first resonance. Bounds and starting values of a
-diagnosis scale so, and so does what the equations call a part of that displacement.
+The stated bounds are those of a reference scanner: 4 V to either side, 22.09 µm at 4 V, first
+resonance 454 Hz. For another scanner lengths scale with the displacement at its largest drive,
+voltages with that drive, and times with the period of its first resonance (the one with the highest
+peak). At the neutral values of its parameters, 0 unless stated, an effect changes nothing.
 
-In the equations w is 2 pi `frequency`. In `hysteretic_stiffness` and `nonlinear_spring` it is the
-angular frequency of the first resonance, whose damping is zeta. The first resonance is the one that
-rises highest.
-
-`afm-scan calibrate --experiment NAME --out DIR` drives an experiment. For the base model it is a
-record of the calibration. At the neutral values of all its parameters an effect changes nothing.
-Effects in the feedback of coupled axes are identified with their vibration: name them to
-`afm_scan_ros.identify`. How to add an effect: [tutorial](../tutorials/adding_an_effect.md).
+In the equations x0 is the displacement without the effect, y0 that of the other axis, G(s) the
+vibration, and w is 2 pi `frequency`; in `hysteretic_stiffness` and `nonlinear_spring` w and zeta are
+those of the first resonance. The docstring of `afm_scan_ros/core/effects/NAME.py` derives each
+equation and states its assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an
+experiment. [Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
 """
 
 
 COUPLED = """\
-`static_nonlinearity`, above, acts there too. `parameter_shift` is another linear response there.
+These effects are identified with the vibration of coupled axes: name them to
+`afm_scan_ros.identify`. `static_nonlinearity`, above, acts there too, and `parameter_shift` stands
+for another linear response.
 """
 
 
@@ -70,7 +72,7 @@ def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
     parts = [
         INTRODUCTION,
         _table(
-            ("effect", "place", "confusable with", "experiment", "feedforward"),
+            ("effect", "place", "experiment", "feedforward"),
             (_summary(each) for each in (*base, *further, *coupled)),
         ),
         "## Base model\n",
@@ -89,49 +91,54 @@ def _summary(of: EffectType) -> tuple[str, ...]:
     return (
         f"[`{of.name}`](#{of.name})",
         ", ".join(places) or (FEEDBACK if of.feedback else of.name),
-        ", ".join(of.confusable),
         of.experiment,
         REMEDIES[of.remedy],
     )
 
 
 def _section(of: EffectType) -> str:
-    heads = ("kind", "place", "parameter", "unit", "from", "to", "neutral")
     facts = (
         f"- Equation: `{of.equation}`",
-        f"- Excitation: {of.needs}.",
+        f"- Excitation: {of.needs}. Experiment: {of.experiment}.",
         f"- Confusable with: {', '.join(of.confusable)}." if of.confusable else "",
-        f"- Experiment: {of.experiment}.",
         f"- Feedforward {REMEDIES[of.remedy]}. {of.advice[0].upper()}{of.advice[1:]}.",
-        f"- Inverse: {of.inverse}" if of.inverse else "",
+        f"- Inverse: {_beginning(of.inverse)}" if of.inverse else "",
         f"- Source: {of.source}",
     )
-    return "\n".join(
-        (
-            f"### {of.name}\n",
-            f"{of.physics.strip()}\n",
-            *(fact for fact in facts if fact),
-            "",
-            _table(heads, _rows(of)),
-        )
-    )
+    given = (f"- Parameters{of_form}." for of_form in _parameters(of))
+    physics = _beginning(of.physics.partition("\n\n")[0], words=1)
+    whole = (f"### {of.name}\n", f"{physics}\n", *filter(None, facts), *given, "")
+    return "\n".join(whole)
 
 
-def _rows(of: EffectType) -> Iterator[tuple[str, ...]]:
-    for parameter in of.parameters:
-        yield ("", of.name, f"`{parameter.name}`", *_numbers(parameter)[:3], "")
+def _beginning(text: str, words: int = 25) -> str:
+    """First sentences of a text, until they have so many words."""
+    found: list[str] = []
+    for sentence in SENTENCE.split(text.strip().removesuffix(".")):
+        found.append(f"{sentence}.")
+        if len(" ".join(found).split()) >= words:
+            break
+    return " ".join(found)
+
+
+def _parameters(of: EffectType) -> Iterator[str]:
+    """Form, place and parameters of each form."""
+    if of.parameters:
+        yield f": {_bounds(of.parameters)}"
     if of.feedback:
-        for parameter in _first(of.feedback.parameters):
-            names = _names(of.feedback.parameters, parameter)
-            yield ("", FEEDBACK, names, *_numbers(parameter)[:3], "")
+        yield f": {_bounds(of.feedback.parameters)}"
     for form in of.forms:
-        for parameter in _first(form.parameters):
-            names = _names(form.parameters, parameter)
-            yield (form.kind, " and ".join(form.places), names, *_numbers(parameter))
+        kind = f" of `{form.kind}`" if form.kind else ""
+        yield f"{kind} ({' and '.join(form.places)}): {_bounds(form.parameters)}"
+
+
+def _bounds(parameters: Sequence[EffectParameter]) -> str:
+    every = (f"{_names(parameters, each)} ({_numbers(each)})" for each in _first(parameters))
+    return ", ".join(every)
 
 
 def _first(parameters: Sequence[EffectParameter]) -> Iterator[EffectParameter]:
-    """Parameters but those that stand in the row of another."""
+    """Parameters but those that are stated with another."""
     return (each for each in parameters if not FURTHER.search(each.name))
 
 
@@ -143,8 +150,10 @@ def _names(parameters: Sequence[EffectParameter], parameter: EffectParameter) ->
     return f"`{parameter.name}` to `{last}`"
 
 
-def _numbers(of: EffectParameter) -> tuple[str, ...]:
-    return of.unit, f"{of.lower:g}", f"{of.upper:g}", f"{of.neutral:g}"
+def _numbers(of: EffectParameter) -> str:
+    neutral = f", neutral {of.neutral:g}" if of.neutral else ""
+    bounds = f", {of.lower:g} to {of.upper:g}" if isfinite(of.upper) else ""
+    return f"{of.unit}{bounds}{neutral}"
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -31,5 +31,5 @@ def test_every_parameter_stands_on_the_page_with_its_bounds() -> None:
         for form in effect.forms:
             for parameter in form.parameters:
                 if not parameter.name[-1].isdigit():
-                    row = f"`{parameter.name}` | {parameter.unit} | {parameter.lower:g} |"
-                    assert row in section
+                    bounds = f"{parameter.lower:g} to {parameter.upper:g}"
+                    assert f"`{parameter.name}` ({parameter.unit}, {bounds}" in section
