@@ -125,7 +125,7 @@ def _parameters(of: EffectType) -> Iterator[str]:
     """Form, place and parameters of each form."""
     if of.parameters:
         yield f": {_bounds(of.parameters)}"
-    if of.feedback:
+    if of.feedback and of.feedback.parameters:
         yield f": {_bounds(of.feedback.parameters)}"
     for form in of.forms:
         kind = f" of `{form.kind}`" if form.kind else ""

@@ -5,6 +5,7 @@ MkDocs runs this file as a hook. ``pages`` needs nothing but the package and its
 
 import ast
 import base64
+import csv
 import importlib
 import json
 import re
@@ -28,6 +29,10 @@ from settings_page import settings_page
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
+TABLES = {
+    f"evidence/tables/{path.stem}.md": path for path in (ROOT / "docs/evidence/tables").glob("*.csv")
+}
+"""Tables that are too long for the pages that discuss them: a page of the site each."""
 
 API = (
     "Public is what `import afm_scan_ros as afm` offers. Units are SI: m, V, s, Hz. Arrays have the"
@@ -65,7 +70,8 @@ def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own type
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Turn links to notebooks, which work in a checkout, into links to their pages."""
+    """Turn links to notebooks and tables, which work in a checkout, into links to their pages."""
+    markdown = re.sub(r"\]\(([^)]*tables/\w+)\.csv\)", r"](\1.md)", markdown)
     return re.sub(r"\]\(\.\./((\.\./)*examples/\w+)\.ipynb\)", r"](\1.md)", markdown)
 
 
@@ -90,7 +96,15 @@ def pages() -> dict[str, str | bytes]:
     made: dict[str, str | bytes] = {name: make() for name, make in PAGES.items()}
     for name, notebook in NOTEBOOKS.items():
         made |= notebook_page(name, notebook)
-    return made
+    return made | {name: table_of(path) for name, path in TABLES.items()}
+
+
+def table_of(path: Path) -> str:
+    """Return a file of comma-separated values as a page."""
+    with path.open(encoding="utf-8", newline="") as file:
+        heads, *rows = (tuple(row) for row in csv.reader(file))
+    title = path.stem.replace("_", " ").capitalize()
+    return f"# {title}\n\n{_table(heads, rows)}\n"
 
 
 def api() -> str:
