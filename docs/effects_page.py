@@ -50,8 +50,8 @@ voltages with that drive, and times with the period of its first resonance (the 
 peak). At the neutral values of its parameters, 0 unless stated, an effect changes nothing.
 
 In the equations x0 is the displacement without the effect, y0 that of the other axis, G(s) the
-vibration, and w is 2 pi `frequency`; in `hysteretic_stiffness` and `nonlinear_spring` w and zeta are
-those of the first resonance. The docstring of `afm_scan_ros/core/effects/NAME.py` derives each
+vibration, and w is 2 pi `frequency`; in `hysteretic_stiffness` and `nonlinear_spring` w and zeta
+are those of the first resonance. The docstring of `afm_scan_ros/core/effects/NAME.py` derives each
 equation and states its assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an
 experiment. [Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
 """
