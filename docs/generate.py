@@ -71,7 +71,17 @@ def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own type
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Turn links to notebooks and tables, which work in a checkout, into links to their pages."""
+    """Turn links to notebooks and tables, which work in a checkout, into links to their pages.
+
+    Where a link to a table is a paragraph, the table stands there.
+    """
+    tables = {path.stem: path for path in TABLES.values()}
+    markdown = re.sub(
+        r"^\[.*\]\([^)]*tables/(\w+)\.csv\)$",
+        lambda found: rows_of(tables[found[1]]),
+        markdown,
+        flags=re.MULTILINE,
+    )
     markdown = re.sub(r"\]\(([^)]*tables/\w+)\.csv\)", r"](\1.md)", markdown)
     return re.sub(r"\]\(\.\./((\.\./)*examples/\w+)\.ipynb\)", r"](\1.md)", markdown)
 
@@ -102,10 +112,14 @@ def pages() -> dict[str, str | bytes]:
 
 def table_of(path: Path) -> str:
     """Return a file of comma-separated values as a page."""
+    return f"# {path.stem.replace('_', ' ').capitalize()}\n\n{rows_of(path)}\n"
+
+
+def rows_of(path: Path) -> str:
+    """Return a file of comma-separated values as a table."""
     with path.open(encoding="utf-8", newline="") as file:
         heads, *rows = (tuple(row) for row in csv.reader(file))
-    title = path.stem.replace("_", " ").capitalize()
-    return f"# {title}\n\n{_table(heads, rows)}\n"
+    return _table(heads, rows)
 
 
 def api() -> str:
