@@ -5,7 +5,7 @@
 
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -22,10 +22,10 @@ INTRODUCTION = """\
 
 <!-- Written by `python docs/effects_page.py docs/reference/effects.md`. -->
 
-Look an effect up here when a diagnosis names it, or when you add it to a model yourself. Creep,
-hysteresis and vibration form the base model, which `afm-scan identify` identifies. The other
-effects extend it: `afm-scan diagnose` fits them to a residual, and a model file lists those that
-were found on an axis.
+Look an effect up here when a diagnosis names it, or to add it to a model yourself. Creep,
+hysteresis and vibration form the base model, which `afm-scan identify` identifies. The others
+extend it: `afm-scan diagnose` fits them to a residual, and a model file lists those that were
+found on an axis.
 
 ```yaml
 added:
@@ -35,25 +35,22 @@ added:
     delay: {value: 2.0e-05, unit: s}
 ```
 
-The signal passes the places of the chain in this order:
+The signal passes the places of the chain in this order. Each effect acts on the model with all
+that are listed before it; a diagnosis tries the orders.
 
     drive u → [drive] → hysteresis → F → vibration → creep
             → + [coupling] → [output] → displacement x
 
-The `hysteresis` inverse includes the effects before the hysteresis, the `vibration` inverse those
-in the vibration, and any inverse those after creep. Each effect acts on the model with all effects
-listed before it, so their order matters; a diagnosis tries the orders.
-
-The stated bounds are those of a reference scanner: 4 V to either side, 22.09 µm at 4 V, first
-resonance 454 Hz. For another scanner lengths scale with the displacement at its largest drive,
-voltages with that drive, and times with the period of its first resonance (the one with the highest
-peak). At the neutral values of its parameters, 0 unless stated, an effect changes nothing.
+Bounds are those of a reference scanner: 4 V to either side, 22.09 µm at 4 V, first resonance (the
+highest peak) 454 Hz. Lengths scale with the displacement at the largest drive, voltages with that
+drive, times with the period of the first resonance. At the neutral values of its parameters, 0
+unless stated, an effect changes nothing.
 
 In the equations x0 is the displacement without the effect, y0 that of the other axis, G(s) the
 vibration, and w is 2 pi `frequency`; in `hysteretic_stiffness` and `nonlinear_spring` w and zeta
-are those of the first resonance. The docstring of `afm_scan_ros/core/effects/NAME.py` derives each
-equation and states its assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an
-experiment. [Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
+are those of the first resonance. `afm_scan_ros/core/effects/NAME.py` derives each equation, with
+its assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an experiment.
+[Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
 """
 
 
@@ -71,10 +68,6 @@ def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
     coupled = [each for each in effects if each.feedback and not each.forms]
     parts = [
         INTRODUCTION,
-        _table(
-            ("effect", "place", "experiment", "feedforward"),
-            (_summary(each) for each in (*base, *further, *coupled)),
-        ),
         "## Base model\n",
         *(_section(each) for each in base),
         "## Effects beyond the base model\n",
@@ -86,16 +79,6 @@ def effects_page(effects: Sequence[EffectType] = EFFECTS) -> str:
     return "\n".join(parts)
 
 
-def _summary(of: EffectType) -> tuple[str, ...]:
-    places = dict.fromkeys(place for form in of.forms for place in form.places)
-    return (
-        f"[`{of.name}`](#{of.name})",
-        ", ".join(places) or (FEEDBACK if of.feedback else of.name),
-        of.experiment,
-        REMEDIES[of.remedy],
-    )
-
-
 def _section(of: EffectType) -> str:
     facts = (
         f"- Equation: `{of.equation}`",
@@ -105,13 +88,13 @@ def _section(of: EffectType) -> str:
         f"- Inverse: {_beginning(of.inverse)}" if of.inverse else "",
         f"- Source: {of.source}",
     )
-    given = (f"- Parameters{of_form}." for of_form in _parameters(of))
+    given = (f"- {of_form}." for of_form in _parameters(of))
     physics = _beginning(of.physics.partition("\n\n")[0], words=1)
     whole = (f"### {of.name}\n", f"{physics}\n", *filter(None, facts), *given, "")
     return "\n".join(whole)
 
 
-def _beginning(text: str, words: int = 25) -> str:
+def _beginning(text: str, words: int = 21) -> str:
     """First sentences of a text, until they have so many words."""
     found: list[str] = []
     for sentence in SENTENCE.split(text.strip().removesuffix(".")):
@@ -124,11 +107,11 @@ def _beginning(text: str, words: int = 25) -> str:
 def _parameters(of: EffectType) -> Iterator[str]:
     """Form, place and parameters of each form."""
     if of.parameters:
-        yield f": {_bounds(of.parameters)}"
+        yield f"Parameters: {_bounds(of.parameters)}"
     if of.feedback and of.feedback.parameters:
-        yield f": {_bounds(of.feedback.parameters)}"
+        yield f"Parameters: {_bounds(of.feedback.parameters)}"
     for form in of.forms:
-        kind = f" of `{form.kind}`" if form.kind else ""
+        kind = f"Form `{form.kind}`" if form.kind else "Parameters"
         yield f"{kind} ({' and '.join(form.places)}): {_bounds(form.parameters)}"
 
 
@@ -151,14 +134,10 @@ def _names(parameters: Sequence[EffectParameter], parameter: EffectParameter) ->
 
 
 def _numbers(of: EffectParameter) -> str:
-    neutral = f", neutral {of.neutral:g}" if of.neutral else ""
-    bounds = f", {of.lower:g} to {of.upper:g}" if isfinite(of.upper) else ""
-    return f"{of.unit}{bounds}{neutral}"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = (heads, ["---"] * len(heads), *rows)
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    unit = of.unit if of.unit != "1" or not isfinite(of.upper) else ""
+    bounds = f"{of.lower:g} to {of.upper:g}" if isfinite(of.upper) else ""
+    neutral = f"neutral {of.neutral:g}" if of.neutral else ""
+    return ", ".join(filter(None, (" ".join(filter(None, (bounds, unit))), neutral)))
 
 
 if __name__ == "__main__":

@@ -31,5 +31,6 @@ def test_every_parameter_stands_on_the_page_with_its_bounds() -> None:
         for form in effect.forms:
             for parameter in form.parameters:
                 if not parameter.name[-1].isdigit():
-                    bounds = f"{parameter.lower:g} to {parameter.upper:g}"
-                    assert f"`{parameter.name}` ({parameter.unit}, {bounds}" in section
+                    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                    bounds = f"{parameter.lower:g} to {parameter.upper:g}{unit}"
+                    assert f"`{parameter.name}` ({bounds}" in section

@@ -1,5 +1,6 @@
-"""The page of the constants states each number that decides a verdict, and no other."""
+"""The table of the constants states each number that decides a verdict, and no other."""
 
+import csv
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -7,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-PAGE = Path(__file__).parents[3] / "docs/reference/diagnosis_constants.md"
+TABLE = Path(__file__).parents[3] / "docs/reference/tables/diagnosis_constants.csv"
 WHOLE = (
     "axis_diagnosis",
     "discrepancy",
@@ -18,7 +19,7 @@ WHOLE = (
     "search",
     "variance",
 )
-"""Modules that decide, and whose numbers are all on the page but those that only set precision."""
+"""Modules that decide, and whose numbers are all in the table but those that only set precision."""
 PRECISION = {"likelihood.SIZES", "discrepancy.SMALLEST", "discrepancy.FINER"}
 ELSEWHERE = {"model": "core", "effect_type": "core.effects"}
 PRECISION |= {"discrepancy.CUBIC_ORDER", "likelihood.PRECISION", "likelihood.ROUNDS"}
@@ -26,12 +27,12 @@ PRECISION |= {f"preparation.{name}" for name in ("FEWEST_SAMPLES", "LEVELS", "RE
 
 
 def stated() -> dict[str, tuple[float, ...]]:
-    """Numbers of the page by their names."""
-    rows = [line.split("|") for line in PAGE.read_text("utf-8").splitlines() if "| `" in line]
-    return {
-        name.strip(" `"): tuple(float(each) for each in value.split(","))
-        for _, name, value, *_ in rows
-    }
+    """Numbers of the table by their names."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return {
+            row["constant"].strip("`"): tuple(float(each) for each in row["value"].split(","))
+            for row in csv.DictReader(file)
+        }
 
 
 def module(name: str) -> ModuleType:
@@ -40,7 +41,7 @@ def module(name: str) -> ModuleType:
 
 
 @pytest.mark.parametrize("name", stated())
-def test_the_page_states_the_number_of_the_code(name: str) -> None:
+def test_the_table_states_the_number_of_the_code(name: str) -> None:
     where, constant = name.rsplit(".", 1)
     value = np.atleast_1d(getattr(module(where), constant))
     assert value == pytest.approx(np.array(stated()[name]), rel=5e-3)

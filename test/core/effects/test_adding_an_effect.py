@@ -72,7 +72,7 @@ def test_the_effect_stands_on_the_catalogue_page(beside: Path, tmp_path: Path) -
     run(beside, "-c", code, str(page))
     written = page.read_text("utf-8")
     assert f"### {NAME}\n\nCrossover distortion: " in written
-    assert "- Parameters (drive): `width` (V, 0 to 1)." in written
+    assert "- Parameters (drive): `width` (0 to 1 V)." in written
     assert f"- Confusable with: {NAME}, hysteretic_stiffness, parameter_shift" in written
     changed = set(effects_page().splitlines()) - set(written.splitlines())
     assert all("backlash" in line or "static_nonlinearity" in line for line in changed)
