@@ -30,8 +30,8 @@ from settings_page import settings_page
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
 TABLES = {
-    f"evidence/tables/{path.stem}.md": path
-    for path in (ROOT / "docs/evidence/tables").glob("*.csv")
+    str(path.relative_to(ROOT / "docs").with_suffix(".md")): path
+    for path in (ROOT / "docs").rglob("tables/*.csv")
 }
 """Tables that are too long for the pages that discuss them: a page of the site each."""
 
