@@ -43,14 +43,15 @@ that are listed before it; a diagnosis tries the orders.
 
 Bounds are those of a reference scanner: 4 V to either side, 22.09 µm at 4 V, first resonance (the
 highest peak) 454 Hz. Lengths scale with the displacement at the largest drive, voltages with that
-drive, times with the period of the first resonance. At the neutral values of its parameters, 0
-unless stated, an effect changes nothing.
+drive, times with the period of the first resonance; a parameter without bounds has those stated
+above it. An effect whose amounts are 0 and whose factors
+are 1 changes nothing.
 
 In the equations x0 is the displacement without the effect, y0 that of the other axis, G(s) the
 vibration, and w is 2 pi `frequency`; in `hysteretic_stiffness` and `nonlinear_spring` w and zeta
-are those of the first resonance. `afm_scan_ros/core/effects/NAME.py` derives each equation, with
-its assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an experiment.
-[Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
+are those of the first resonance. `afm_scan_ros/core/effects/NAME.py` derives each equation and its
+inverse, with their assumptions. `afm-scan calibrate --experiment NAME --out DIR` drives an
+experiment. [Adding an effect](../tutorials/adding_an_effect.md) takes one new file.
 """
 
 
@@ -85,39 +86,40 @@ def _section(of: EffectType) -> str:
         f"- Excitation: {of.needs}. Experiment: {of.experiment}.",
         f"- Confusable with: {', '.join(of.confusable)}." if of.confusable else "",
         f"- Feedforward {REMEDIES[of.remedy]}. {of.advice[0].upper()}{of.advice[1:]}.",
-        f"- Inverse: {_beginning(of.inverse)}" if of.inverse else "",
+        f"- Inverse: {_sentence(of.inverse)}" if of.inverse else "",
         f"- Source: {of.source}",
     )
     given = (f"- {of_form}." for of_form in _parameters(of))
-    physics = _beginning(of.physics.partition("\n\n")[0], words=1)
-    whole = (f"### {of.name}\n", f"{physics}\n", *filter(None, facts), *given, "")
+    whole = (f"### {of.name}\n", f"{_sentence(of.physics)}\n", *filter(None, facts), *given, "")
     return "\n".join(whole)
 
 
-def _beginning(text: str, words: int = 21) -> str:
-    """First sentences of a text, until they have so many words."""
-    found: list[str] = []
-    for sentence in SENTENCE.split(text.strip().removesuffix(".")):
-        found.append(f"{sentence}.")
-        if len(" ".join(found).split()) >= words:
-            break
-    return " ".join(found)
+def _sentence(text: str) -> str:
+    """First sentence of a text."""
+    first, *more = SENTENCE.split(text.strip().partition("\n\n")[0])
+    return f"{first}." if more else first
 
 
 def _parameters(of: EffectType) -> Iterator[str]:
-    """Form, place and parameters of each form."""
+    """Form, place and parameters of each form, bounds where they were not stated before."""
+    seen: set[str] = set()
     if of.parameters:
-        yield f"Parameters: {_bounds(of.parameters)}"
+        yield f"Parameters: {_bounds(of.parameters, seen)}"
     if of.feedback and of.feedback.parameters:
-        yield f"Parameters: {_bounds(of.feedback.parameters)}"
+        yield f"Parameters: {_bounds(of.feedback.parameters, seen)}"
     for form in of.forms:
         kind = f"Form `{form.kind}`" if form.kind else "Parameters"
-        yield f"{kind} ({' and '.join(form.places)}): {_bounds(form.parameters)}"
+        yield f"{kind} ({' and '.join(form.places)}): {_bounds(form.parameters, seen)}"
 
 
-def _bounds(parameters: Sequence[EffectParameter]) -> str:
-    every = (f"{_names(parameters, each)} ({_numbers(each)})" for each in _first(parameters))
-    return ", ".join(every)
+def _bounds(parameters: Sequence[EffectParameter], seen: set[str]) -> str:
+    found = []
+    for each in _first(parameters):
+        names = _names(parameters, each)
+        whole = f"{names} ({_numbers(each)})"
+        found.append(names if whole in seen else whole)
+        seen.add(whole)
+    return ", ".join(found)
 
 
 def _first(parameters: Sequence[EffectParameter]) -> Iterator[EffectParameter]:
@@ -136,8 +138,7 @@ def _names(parameters: Sequence[EffectParameter], parameter: EffectParameter) ->
 def _numbers(of: EffectParameter) -> str:
     unit = of.unit if of.unit != "1" or not isfinite(of.upper) else ""
     bounds = f"{of.lower:g} to {of.upper:g}" if isfinite(of.upper) else ""
-    neutral = f"neutral {of.neutral:g}" if of.neutral else ""
-    return ", ".join(filter(None, (" ".join(filter(None, (bounds, unit))), neutral)))
+    return f"{bounds} {unit}".strip()
 
 
 if __name__ == "__main__":
