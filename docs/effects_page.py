@@ -16,7 +16,13 @@ FURTHER = re.compile("_([3-9]|[12][0-9])$")
 """Ends of the names of numbered parameters, which are stated with the second."""
 SENTENCE = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z`])")
 FEEDBACK = "feedback"
-REMEDIES = {"feedforward": "removes it", "partly": "removes it in part", "none": "cannot remove it"}
+REMEDIES = {
+    "feedforward": "",
+    "partly": "Feedforward removes it in part. ",
+    "none": "Feedforward cannot remove it. ",
+}
+PAPER = "D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123 (2001) 35"
+"""What the sources of the base model begin with."""
 INTRODUCTION = """\
 # Effects
 
@@ -25,7 +31,8 @@ INTRODUCTION = """\
 Look an effect up here when a diagnosis names it, or to add it to a model yourself. Creep,
 hysteresis and vibration form the base model, which `afm-scan identify` identifies. The others
 extend it: `afm-scan diagnose` fits them to a residual, and a model file lists those that were
-found on an axis.
+found on an axis. Feedforward by the inverse removes an effect unless stated otherwise. The paper
+that is named most is D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123 (2001) 35.
 
 ```yaml
 added:
@@ -85,9 +92,9 @@ def _section(of: EffectType) -> str:
         f"- Equation: `{of.equation}`",
         f"- Excitation: {of.needs}. Experiment: {of.experiment}.",
         f"- Confusable with: {', '.join(of.confusable)}." if of.confusable else "",
-        f"- Feedforward {REMEDIES[of.remedy]}. {of.advice[0].upper()}{of.advice[1:]}.",
+        f"- {REMEDIES[of.remedy]}{of.advice[0].upper()}{of.advice[1:]}.",
         f"- Inverse: {_sentence(of.inverse)}" if of.inverse else "",
-        f"- Source: {of.source}",
+        f"- Source: {of.source.replace(PAPER, 'Croft, Shed and Devasia (2001)')}",
     )
     given = (f"- {of_form}." for of_form in _parameters(of))
     whole = (f"### {of.name}\n", f"{_sentence(of.physics)}\n", *filter(None, facts), *given, "")
