@@ -29,9 +29,8 @@ INTRODUCTION = """\
 <!-- Written by `python docs/effects_page.py docs/reference/effects.md`. -->
 
 Look an effect up here when a diagnosis names it, or to add it to a model yourself. Creep,
-hysteresis and vibration form the base model, which `afm-scan identify` identifies. The others
-extend it: `afm-scan diagnose` fits them to a residual, and a model file lists those that were
-found on an axis. Feedforward by the inverse removes an effect unless stated otherwise. The paper
+hysteresis and vibration form the base model; the others extend it, and a model file lists those
+of an axis. Feedforward by the inverse removes an effect unless stated otherwise. The paper
 that is named most is D. Croft, G. Shed and S. Devasia, J. Dyn. Syst. Meas. Control 123 (2001) 35.
 
 ```yaml
