@@ -1,4 +1,4 @@
-"""The documents: commands and code work, links lead somewhere, sentences are short."""
+"""The documents: commands and code work, and links lead somewhere."""
 
 import ast
 import re
