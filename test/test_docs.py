@@ -1,6 +1,7 @@
 """The documents: commands and code work, and links lead somewhere."""
 
 import ast
+import csv
 import re
 import runpy
 import shlex
@@ -23,7 +24,7 @@ DOCUMENTS = [
     *sorted(ROOT.glob("*.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
-EVERY_LINE = re.MULTILINE | re.DOTALL
+TABLES = sorted((ROOT / "docs").rglob("tables/*.csv"))
 MOST_README_LINES = 120
 
 
@@ -177,6 +178,22 @@ def test_the_site_s_links_lead_to_pages_of_notebooks(generator: dict[str, Any]) 
         known = {(ROOT / "docs" / name).resolve() for name in generator["NOTEBOOKS"]}
         assert pages
         assert {(path.parent / page).resolve() for page in pages} <= known
+
+
+@pytest.mark.parametrize("path", TABLES, ids=relative)
+def test_a_page_shows_each_table(path: Path) -> None:
+    with path.open(encoding="utf-8", newline="") as file:
+        heads, *rows = csv.reader(file)
+    assert rows
+    assert all(len(row) == len(heads) for row in rows)
+    assert any(f"tables/{path.name})" in page.read_text("utf-8") for page in DOCUMENTS)
+
+
+def test_a_link_to_a_table_is_the_table_where_it_is_a_paragraph(generator: dict[str, Any]) -> None:
+    page = "[Parts](tables/inverse.csv)\n\nMore is in [all sizes](tables/reach.csv).\n"
+    made = generator["on_page_markdown"](page)
+    assert made.startswith("| what | command | result |\n")
+    assert made.endswith("\n\nMore is in [all sizes](tables/reach.md).\n")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
