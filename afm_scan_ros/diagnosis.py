@@ -158,11 +158,12 @@ class Diagnosis:
             () if isinstance(found, CoupledDiagnosis) else tuple(map(caution_text, found.cautions))
         )
 
-    def save(self, folder: Path | str) -> None:
-        """Write diagnosis.json, model.extended.yaml, report.html and its figures to a folder.
+    def save(self, folder: Path | str, figures: str | None = None) -> None:
+        """Write diagnosis.json, model.extended.yaml and report.html to a folder.
 
-        Of coupled axes there are no figures. Folders that are missing are made. Raises InputError
-        where a file cannot be written.
+        ``figures``, one of pdf, svg and png, has the report's pictures written beside it, of which
+        coupled axes have none. Folders that are missing are made. Raises InputError where a file
+        cannot be written.
         """
         into = path_of(folder, "diagnosis")
         sources = [
@@ -174,9 +175,7 @@ class Diagnosis:
         if isinstance(self._found, CoupledDiagnosis):
             diagnosis_page.write_coupled(into, self._found, HEADING, of)
             return
-        from afm_scan_ros.report.diagnosis_page import write_diagnosis  # noqa: PLC0415 - draws
-
-        write_diagnosis(into, self.residual_report, HEADING, of)
+        diagnosis_page.write_diagnosis(into, self.residual_report, HEADING, of, figures)
 
 
 def diagnose(

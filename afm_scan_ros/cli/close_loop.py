@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
-from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
+from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
@@ -20,10 +20,9 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import load_plant, load_scan
 from afm_scan_ros.nodes.flow import FLOW
-from afm_scan_ros.report.close_loop import close_loop_page, final_text, reported, round_result
+from afm_scan_ros.report.close_loop import close_loop_report, final_text, reported, round_result
 from afm_scan_ros.report.diagnosis_json import closed_loop_document, diagnosis_of, save_diagnosis
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import next_steps
@@ -53,7 +52,15 @@ HEADING = "A scanner's model with the effects that 'afm-scan close-loop' identif
     show_default=True,
     help="Largest number of rounds.",
 )
-def close_loop(spec: Path, model: Path, driven: DrivenScanner, out: Path, rounds: int) -> None:
+@FIGURES
+def close_loop(
+    spec: Path,
+    model: Path,
+    driven: DrivenScanner,
+    out: Path,
+    rounds: int,
+    figures: str | None,
+) -> None:
     """Scan, diagnose what the model lacks, extend the model, and scan again with its inverse.
 
     The scan of --spec is diagnosed. It and three others are made before and after: another rate,
@@ -76,14 +83,13 @@ def close_loop(spec: Path, model: Path, driven: DrivenScanner, out: Path, rounds
             say(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
-            write_diagnosis(
-                out / f"round_{len(done)}", report_residual(each.diagnosis), HEADING, of
-            )
+            described = report_residual(each.diagnosis)
+            write_diagnosis(out / f"round_{len(done)}", described, HEADING, of, figures)
     except (InputError, ScanError) as error:
         if done:
-            _conclude(out, done, provenance(session.sources), failure=str(error))
+            _conclude(out, done, provenance(session.sources), figures, str(error))
         raise
-    _conclude(out, done, provenance(session.sources))
+    _conclude(out, done, provenance(session.sources), figures)
     first = done[0]
     if not first.improved and first.diagnosis.verdict != SUFFICIENT:
         raise ScanError(_shortcoming(first))
@@ -114,12 +120,14 @@ def _diagnose(model: ScannerModel, records: Sequence[Record]) -> ScannerDiagnosi
         return diagnose(model, records, progress)
 
 
-def _conclude(out: Path, done: Sequence[Round], of: Provenance, failure: str = "") -> None:
+def _conclude(
+    out: Path, done: Sequence[Round], of: Provenance, figures: str | None, failure: str = ""
+) -> None:
     """Write and print the results of the rounds; ``failure`` is what ended the next, if any."""
     made = {"provenance": plain(of)}
     save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
-    write_text(out / "report.html", close_loop_page(done, of, failure))
+    close_loop_report(done, of, failure).write(out / "report.html", figures)
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)

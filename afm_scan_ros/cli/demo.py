@@ -8,26 +8,25 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.execution import how_scans_run
-from afm_scan_ros.cli.options import CONFIG, FOLDER
+from afm_scan_ros.cli.options import CONFIG, FIGURES, FOLDER
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report.analysis import analyse, scan_spec
-from afm_scan_ros.report.scan_figures import (
+from afm_scan_ros.report.page import CommandLine
+from afm_scan_ros.report.scan_pictures import (
     WITH,
     WITHOUT,
     Images,
     ScanExcerpt,
     TwoScans,
-    comparison_figure,
+    comparison_picture,
     images_of,
-    save,
     view_of,
 )
-from afm_scan_ros.report.scan_report import DemoScan, Scanned, contributions, report, tracking
+from afm_scan_ros.report.scan_report import DemoScan, Scanned, contributions, demo_report, tracking
 
 SAMPLES_AND_TURNAROUND = {5.0: (4_000, 0.1), 30.0: (1_000, 0.1), 100.0: (500, 0.2)}
 """Samples per line and share of a line for turning round, at each line rate (Hz)."""
@@ -65,9 +64,10 @@ IMAGED = (
     type=FOLDER,
     default="demo",
     show_default=True,
-    help="Folder for bags, figures and report.",
+    help="Folder for bags, tables and report.",
 )
-def demo(out: Path) -> None:
+@FIGURES
+def demo(out: Path, figures: str | None) -> None:
     """Scan a simulated scanner without and with compensation, and compare the errors.
 
     The scanner is config/plant.yaml. The model is config/model.yaml, identified from simulated
@@ -83,30 +83,35 @@ def demo(out: Path) -> None:
     for table in tables:
         table.show()
         table.save(out)
-    figures = {rate: comparison_figure(*_views(rate, out)) for rate in LINE_RATES}
-    for rate, figure in figures.items():
-        save(figure, out / f"comparison_{rate:g}hz.png")
-    page = report(tables, figures, (IMAGED[0], _images(out)), next_commands(out), ran)
-    write_text(out / "report.html", page)
-    click.echo(f"Report: {out / 'report.html'}. Bags, figures and JSON are in the same folder.")
+    compared = {
+        rate: comparison_picture(f"{rate:g}hz", *_views(rate, out), f"{rate:g} Hz")
+        for rate in LINE_RATES
+    }
+    made = demo_report(tables, compared, (IMAGED[0], _images(out)), next_commands(out), ran)
+    made.write(out / "report.html", figures)
+    click.echo(f"Report: {out / 'report.html'}. Bags and JSON are in the same folder.")
 
 
-def next_commands(out: Path) -> Iterator[tuple[str, str]]:
-    """Yield what to do after the demonstration: a purpose and its command line."""
+def next_commands(out: Path) -> Iterator[CommandLine]:
+    """Yield what to do after the demonstration."""
     calibration = out / "calibration"
     records = ("creep", "frequency", "hysteresis", "validation")
     bags = " ".join(f"--{kind} {calibration / kind}" for kind in records)
-    yield (
+    yield CommandLine(
         "See all errors of one scan.",
         f"afm-scan analyze {out / 'bags' / '30hz_all'} --report {out / 'scan.html'}",
     )
-    yield "Record the identification drives.", f"afm-scan calibrate --out {calibration}"
-    yield "Identify a model from them.", f"afm-scan identify {bags} --out {out / 'model.yaml'}"
-    yield (
+    yield CommandLine(
+        "Record the identification drives.", f"afm-scan calibrate --out {calibration}"
+    )
+    yield CommandLine(
+        "Identify a model from them.", f"afm-scan identify {bags} --out {out / 'model.yaml'}"
+    )
+    yield CommandLine(
         "Find an effect that the model lacks, and compensate it.",
         f"afm-scan close-loop --plant {CONFIG / 'plants/delay_medium.yaml'} --out {out / 'loop'}",
     )
-    yield "Import a measured record of your own scanner.", "afm-scan import-csv --help"
+    yield CommandLine("Import a measured record of your own scanner.", "afm-scan import-csv --help")
 
 
 def _scan(case: DemoScan, out: Path) -> Path:

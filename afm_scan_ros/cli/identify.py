@@ -8,6 +8,7 @@ from attrs import evolve
 
 from afm_scan_ros import identification as api
 from afm_scan_ros.cli.options import (
+    FIGURES,
     NEW_FILE,
     RECORD,
     TableOptions,
@@ -23,7 +24,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import Model
 from afm_scan_ros.report.effect_status_text import status_text, unknown_effects
-from afm_scan_ros.report.fit_page import fit_page
+from afm_scan_ros.report.fit_page import fit_report
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.terminal import say
 
@@ -66,6 +67,7 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
     " Records of one axis give a model of that axis.",
 )
+@FIGURES
 def identify(
     records: tuple[Path, ...],
     effects: tuple[str, ...],
@@ -74,6 +76,7 @@ def identify(
     tables: TableOptions,
     *,
     linear: bool,
+    figures: str | None,
     **bags: Path | None,
 ) -> None:
     """Identify a model from RECORDs of any kinds, and report how well it fits.
@@ -95,7 +98,7 @@ def identify(
     model.save(out, HEADING)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
     write_text(out.with_suffix(".fit.json"), summary + "\n")
-    write_text(out.with_suffix(".fit.html"), fit_page(found))
+    fit_report(found, str(out)).write(out.with_suffix(".fit.html"), figures)
     _show(found)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     say(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")

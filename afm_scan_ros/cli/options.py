@@ -77,6 +77,11 @@ class _Path(click.Path):
 
 FILE = _Path(dir_okay=False)
 NEW_FILE = _Path(dir_okay=False, new=True)
+FIGURES = click.option(
+    "--figures",
+    type=click.Choice(["pdf", "svg", "png"]),
+    help="Write each picture of the report beside it too, as files of this format.",
+)
 FOLDER = _Path(file_okay=False, new=True)
 """Folder to write files to."""
 RECORD = _Path()

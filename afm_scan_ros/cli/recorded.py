@@ -10,6 +10,7 @@ import numpy as np
 from afm_scan_ros import diagnosis as api
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.options import (
+    FIGURES,
     FILE,
     FOLDER,
     NEW_FILE,
@@ -32,7 +33,7 @@ from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import load_model
 from afm_scan_ros.report.analysis import AxisComparison, Comparison, analyse, comparable, compare
 from afm_scan_ros.report.quantity import nanometres
-from afm_scan_ros.report.scan_figures import save, tracking_figure, view_of
+from afm_scan_ros.report.scan_pictures import tracking_picture, view_of
 from afm_scan_ros.report.scan_report import error_tables, scan_report, scan_rows
 from afm_scan_ros.report.table import Rows, show
 from afm_scan_ros.report.terminal import say
@@ -47,15 +48,19 @@ from afm_scan_ros.report.terminal import say
     type=NEW_FILE,
     help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
+@FIGURES
 @topic_option
 def analyze(
     bag: Path,
     json_file: Path | None,
     report: Path | None,
     figure: Path | None,
+    figures: str | None,
     topics: Mapping[str, str],
 ) -> None:
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
+    if figures is not None and report is None:
+        raise click.UsageError("--figures are written beside a report: give --report")
     recording = read_scan(bag, topics)
     if comparable(recording) and report is None and figure is None:
         compared = compare(recording)
@@ -68,9 +73,12 @@ def analyze(
     if json_file is not None:
         write_text(json_file, json.dumps(plain(analysis), indent=2) + "\n")
     if report is not None:
-        write_text(report, scan_report(analysis, view_of(recording)))
+        scan_report(analysis, recording).write(report, figures)
     if figure is not None:
-        save(tracking_figure(view_of(recording), f"Scan {analysis.scan.scan_id}"), figure)
+        from afm_scan_ros.report.paper import paper_figure, save  # noqa: PLC0415 - by matplotlib
+
+        title = f"Scan {analysis.scan.scan_id}"
+        save(paper_figure(tracking_picture(view_of(recording), title)), figure)
     if analysis.shortcomings:
         raise ScanError("; ".join(analysis.shortcomings))
 
@@ -110,7 +118,7 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
     "--out",
     required=True,
     type=FOLDER,
-    help="Folder for diagnosis.json, model.extended.yaml, report.html and its pictures.",
+    help="Folder for diagnosis.json, model.extended.yaml, report.html.",
 )
 @click.option(
     "--longest",
@@ -125,8 +133,9 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
     help="Ask what the structure of the model lacks, and not what has changed since it was"
     " identified: its stated error then explains nothing.",
 )
+@FIGURES
 @record_options
-def diagnose(
+def diagnose(  # noqa: PLR0913 - click hands over one parameter an option
     bags: tuple[Path, ...],
     model: Path,
     healthy: tuple[Path, ...],
@@ -135,6 +144,7 @@ def diagnose(
     tables: TableOptions,
     *,
     structure: bool,
+    figures: str | None,
 ) -> None:
     """Identify the effect that a model lacks, from the residual of records.
 
@@ -147,11 +157,11 @@ def diagnose(
     with working("diagnosing") as progress:
         found = api.diagnose(base, records, well, progress, longest, structure=structure)
         progress("describing the residual")
-        found.save(out)
+        found.save(out, figures)
     for record in (*records, *well):
         warn(_doubts(record))
     show(found.summary)
-    say(f"Report: {out / 'report.html'}. JSON, extended model and figures are beside it.")
+    say(f"Report: {out / 'report.html'}. JSON and extended model are beside it.")
 
 
 def _doubts(record: Record) -> Iterator[str]:

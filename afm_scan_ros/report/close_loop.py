@@ -7,7 +7,6 @@ from afm_scan_ros.core.metrics import Figure, Tracking
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import (
     HELD_OUT,
     effects,
@@ -16,9 +15,12 @@ from afm_scan_ros.report.diagnosis_text import (
     residuals,
     verdict_text,
 )
+from afm_scan_ros.report.page import Link, Report, Section
+from afm_scan_ros.report.page import Part as PagePart
+from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres
-from afm_scan_ros.report.scan_figures import TwoScans, error_figure, image_figure, images_of
+from afm_scan_ros.report.scan_pictures import TwoScans, error_picture, image_picture, images_of
 from afm_scan_ros.report.table import Part, Rows
 
 Row = tuple[str, ...]
@@ -145,38 +147,64 @@ def final_text(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
         yield f"Tracking error in {axis}, measured, rms: {change} nm."
 
 
-def close_loop_page(rounds: Sequence[Round], of: Provenance, failure: str = "") -> str:
-    """Return the report as a self-contained HTML page; ``failure`` ended the next round, if any."""
-    found = reported(rounds).diagnosis
-    return html.page(
-        "close_loop.html",
-        result=(*verdict_text(found), *effects(found), *final_text(rounds, failure)),
-        next_steps=next_steps(found),
-        rounds=[
-            {
-                "verdict": done.diagnosis.verdict,
-                "result": round_result(done),
-                "scans": _scans(done) if done.comparisons else None,
-            }
-            for done in rounds
+METHOD = (
+    "Each scan uses all inverses of its model. The error is achieved minus desired displacement,"
+    " rms about zero, without the first line. Nothing is fitted to it. 'Measured' contains sensor"
+    " noise, 'true' does not. For y, constant speed is the part on trace."
+)
+UNSEEN = (
+    "The residual is measured minus predicted displacement, without its mean. It is that of the"
+    " whole scans made with the extended model's inverse, which no fit saw."
+)
+
+
+def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = "") -> Report:
+    """Return the report on the rounds; ``failure`` ended the next one, if any."""
+    last = reported(rounds)
+    found = last.diagnosis
+    compared = [(number, done) for number, done in enumerate(rounds, 1) if done.comparisons]
+    shown = next((number for number, done in compared if done is last), None)
+    return Report(
+        title="Closed loop: scan, diagnose, extend, scan again",
+        answer=[*verdict_text(found), " ".join(final_text(rounds, failure))],
+        picture=_lines(last, shown) if shown else None,
+        next_steps=list(next_steps(found)),
+        evidence=[
+            *(_round(number, done, first=number == shown) for number, done in enumerate(rounds, 1)),
+            Section("Method", [METHOD]),
         ],
-        names=NAMES,
+        warnings=of.shortcomings,
         provenance=of,
     )
 
 
-def _scans(done: Round) -> dict[str, object]:
-    """Return what the page shows of the scans with either inverse."""
+def _round(number: int, done: Round, *, first: bool) -> Section:
+    """Return what a round found; its lines are elsewhere where it is shown ``first``."""
+    parts: list[PagePart] = list(round_result(done))
+    parts.append(Link(f"Diagnosis of round {number}", f"round_{number}/report.html"))
+    if done.comparisons:
+        parts += [Rows(RESIDUAL, trial_residual_rows(done)), UNSEEN]
+        parts += [] if first else [_lines(done, number)]
+        parts.append(_grating(done, number))
+    return Section(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}", parts)
+
+
+def _lines(done: Round, number: int) -> Picture:
+    kind = "True" if done.before[FIRST].knows_true else "Measured"
+    return error_picture(f"lines_{number}", _both(done, FIRST), kind)
+
+
+def _grating(done: Round, number: int) -> Picture:
+    """Show a grating as a scan with either inverse images it."""
     imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
     images = images_of(_both(done, imaged))
-    return {
-        "residuals": Rows(RESIDUAL, trial_residual_rows(done)),
-        "displacement": "True" if done.before[FIRST].knows_true else "Measured",
-        "lines": html.png(error_figure(_both(done, FIRST))),
-        "imaged": imaged,
-        "grating": html.png(image_figure(images)),
-        "errors": images.errors,
-    }
+    before, after = (nanometres(error) for error in images.errors)
+    caption = (
+        f"A simulated grating of 16 µm pitch and 100 nm height, imaged by '{imaged}'. Each height"
+        f" is drawn at the desired position. The height error is {before} nm rms {NAMES[0]} and"
+        f" {after} nm rms {NAMES[1]}."
+    )
+    return image_picture(f"grating_{number}", images, caption)
 
 
 def _both(done: Round, name: str) -> TwoScans:

@@ -1,11 +1,9 @@
 """The report on a residual, also of coupled axes: the page, and the folder that holds it."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
@@ -23,8 +21,6 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.coupled_file import save_coupled
 from afm_scan_ros.files.model_file import save_model
-from afm_scan_ros.files.paths import replacing, write_text
-from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
 from afm_scan_ros.report.diagnosis_text import (
     LIMITS,
@@ -38,41 +34,102 @@ from afm_scan_ros.report.diagnosis_text import (
     probability_text,
     result,
     share_text,
+    verdict_text,
     why_not_text,
 )
+from afm_scan_ros.report.page import Report, Section
+from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
 from afm_scan_ros.report.residual import (
     chosen_text,
     initial_state_text,
-    residual_figure,
+    residual_pictures,
     residual_text,
 )
 from afm_scan_ros.report.table import Part, Rows
 
+SHARES = (
+    "The share of an effect is the part of the held-out mean square that returns when it alone is"
+    " left out. The other effects keep their fitted values. Shares of several effects need not sum"
+    " to 100 %."
+)
+METHOD = (
+    "The residual is measured minus predicted displacement under the recorded drive, each without"
+    " its mean. The detection limit of a band is sensor noise plus model discrepancy, which scales"
+    " with the record's motion. The likelihood of a residual is Student's t distribution in each"
+    " band. The probability of a set of effects follows from its evidence over all data, by"
+    " Laplace's method. An effect is named where its probability is 95 % or more and no band lacks"
+    " anything. Residuals in nm are of held-out stretches: the values are then fitted to the other"
+    " stretches. Intervals are 95 % intervals."
+)
+RECORDS = ("record", "samples", "sample period", "x at the start", "y at the start")
 
-def diagnosis_page(found: ResidualReport, drawn: Mapping[str, bytes], of: Provenance) -> str:
-    """Return the report as a self-contained HTML page, with the pictures of the axes."""
+
+def diagnosis_report(found: ResidualReport, of: Provenance) -> Report:
+    """Return the report on a diagnosis, with the pictures of the axes."""
     diagnosis = found.diagnosis
-    states = [map(initial_state_text, found.before[axis]) for axis in found.before]
-    return html.page(
-        "diagnosis.html",
+    drawn = {axis: _pictures(found, each) for axis, each in diagnosis.by_axis.items()}
+    first = max(drawn, key=lambda axis: diagnosis.rms_before[axis] / diagnosis.noise_floor[axis])
+    residuals = [
+        Section(
+            f"The residual in {axis}",
+            [*_residual(found, axis), *(pictures[1:] if axis == first else pictures)],
+        )
+        for axis, pictures in drawn.items()
+    ]
+    return Report(
+        title="Diagnosis of a scanner's residual",
+        answer=[*verdict_text(diagnosis), *_change(diagnosis)],
+        picture=drawn[first][0],
+        next_steps=list(next_steps(diagnosis)),
+        evidence=[
+            Section("Effects, probabilities and residuals", list(result(diagnosis))),
+            *_effect_sections(diagnosis),
+            *residuals,
+            Section("Records", [Rows(RECORDS, list(_records(found)))]),
+            Section("Method", [METHOD]),
+        ],
+        warnings=of.shortcomings,
         provenance=of,
-        result=result(diagnosis),
-        next_steps=next_steps(diagnosis),
-        effects=list(_effects(diagnosis)),
-        alternatives=Rows(TRIED, alternative_rows(diagnosis)),
-        residuals={axis: (_residual(found, axis), drawn[axis]) for axis in diagnosis.by_axis},
-        records=zip(diagnosis.observations, zip(*states, strict=True), strict=True),
     )
 
 
-def _figure(found: ResidualReport, diagnosed: AxisDiagnosis) -> Figure:
-    record = most_excited_record(diagnosed)
-    stages = [found.before[diagnosed.axis][record]]
+def _change(found: ScannerDiagnosis | CoupledDiagnosis) -> Iterator[str]:
+    """Say in a sentence what the effects found explain of the residual."""
+    figures = found.rms_before, found.rms_after, found.noise_floor
+    each = [
+        "{}: {} nm with the model, {} nm with the extended model, detection limit {} nm".format(
+            axis, *(nanometres(of[axis]) for of in figures)
+        )
+        for axis in found.noise_floor
+    ]
+    yield f"Residual, rms: {'; '.join(each)}."
+
+
+def _effect_sections(found: ScannerDiagnosis) -> Iterator[Section]:
+    evidence = list(_effects(found))
+    if evidence:
+        yield Section("Evidence for the effects", [*evidence, SHARES])
+    alternatives = alternative_rows(found)
+    if alternatives:
+        yield Section("Alternatives", [Rows(TRIED, alternatives)])
+
+
+def _records(found: ResidualReport) -> Iterator[tuple[str, ...]]:
+    observations = found.diagnosis.observations
+    states = zip(*(map(initial_state_text, each) for each in found.before.values()), strict=True)
+    for record, state in zip(observations, states, strict=True):
+        period = f"{1e6 * record.sample_period:g} µs"
+        yield record.name, f"{len(record.drive):,}", period, *state
+
+
+def _pictures(found: ResidualReport, diagnosed: AxisDiagnosis) -> tuple[Picture, Picture]:
+    record, axis = most_excited_record(diagnosed), diagnosed.axis
+    stages = [found.before[axis][record]]
     if diagnosed.final is not diagnosed.chain:
-        stages.append(found.after[diagnosed.axis][record])
-    return residual_figure(diagnosed.evidence[record].limit, *stages)
+        stages.append(found.after[axis][record])
+    return residual_pictures(axis, diagnosed.evidence[record].limit, *stages)
 
 
 def _effects(found: ScannerDiagnosis) -> Iterator[str]:
@@ -96,17 +153,17 @@ def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
         yield f"With the extended model: {' '.join(after)}"
 
 
-def write_diagnosis(folder: Path, found: ResidualReport, heading: str, of: Provenance) -> None:
-    """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's."""
-    by_axis = found.diagnosis.by_axis
-    drawn = {axis: html.png(_figure(found, diagnosed)) for axis, diagnosed in by_axis.items()}
+def write_diagnosis(
+    folder: Path, found: ResidualReport, heading: str, of: Provenance, figures: str | None
+) -> None:
+    """Write all files of a diagnosis; ``heading`` begins the comment at the head of the model's.
+
+    ``figures`` is the format of the pictures beside the report, if there are to be any.
+    """
     save_diagnosis(folder / "diagnosis.json", {**account_document(found), "provenance": plain(of)})
     head = f"{heading}\n{heading_lines(of)}"
     save_model(folder / "model.extended.yaml", found.diagnosis.model, head)
-    write_text(folder / "report.html", diagnosis_page(found, drawn, of))
-    for axis, content in drawn.items():
-        with replacing(folder / f"residual_{axis}.png") as beside:
-            beside.write_bytes(content)
+    diagnosis_report(found, of).write(folder / "report.html", figures)
 
 
 COUPLED_ROWS = ("effect", "probability", "share of the residual's\nmean square, %")
@@ -155,14 +212,32 @@ def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Prove
     """Write diagnosis.json, the extended model and the report."""
     save_diagnosis(folder / "diagnosis.json", {**coupled_document(found), "provenance": plain(of)})
     save_coupled(folder / "model.extended.yaml", found.model, f"{heading}\n{heading_lines(of)}")
-    page = html.page(
-        "coupled_diagnosis.html",
+    coupled_report(found, of).write(folder / "report.html", None)
+
+
+COUPLED_METHOD = (
+    "Each set of effects is fitted with the structure to all records but the last of each"
+    " amplitude. Its simulation of these is compared with them. The likelihood of what it leaves is"
+    " Student's t distribution in each band, of noise and the error that the model states."
+)
+
+
+def coupled_report(found: CoupledDiagnosis, of: Provenance) -> Report:
+    """Return the report on a diagnosis of coupled axes, which has no picture."""
+    verdict, *rest = coupled_result(found)
+    return Report(
+        title="Diagnosis of coupled axes",
+        answer=[str(verdict), *_change(found)],
+        picture=None,
+        next_steps=[step.removeprefix("next: ") for step in coupled_next_steps(found)],
+        evidence=[
+            Section("Effects, probabilities and residuals", rest),
+            Section("Alternatives", [Rows(TRIED, _alternatives(found))]),
+            Section("Method", [COUPLED_METHOD]),
+        ],
+        warnings=of.shortcomings,
         provenance=of,
-        result=coupled_result(found),
-        next_steps=coupled_next_steps(found),
-        alternatives=Rows(TRIED, _alternatives(found)),
     )
-    write_text(folder / "report.html", page)
 
 
 def coupled_document(found: CoupledDiagnosis) -> dict[str, Any]:

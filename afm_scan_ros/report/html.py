@@ -1,14 +1,8 @@
 """Self-contained HTML pages from templates, in which no text is markup."""
 
-from base64 import b64encode
-from io import BytesIO
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from matplotlib.figure import Figure
-
-from afm_scan_ros.report.quantity import nanometres
-from afm_scan_ros.report.style import styled
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -27,17 +21,11 @@ def page(name: str, folder: Path = TEMPLATES, **values: object) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates.filters |= {"base64": _base64, "nm": nanometres}
+    templates.tests["kind"] = _is_kind
+    templates.filters["zip"] = zip
     return templates.get_template(name).render(values)
 
 
-@styled
-def png(figure: Figure) -> bytes:
-    """Draw a figure, as a PNG file has it."""
-    stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=160)
-    return stream.getvalue()
-
-
-def _base64(content: bytes) -> str:
-    return b64encode(content).decode("ascii")
+def _is_kind(part: object, name: str) -> bool:
+    """Whether a part of a page is of the class of this name."""
+    return type(part).__name__ == name

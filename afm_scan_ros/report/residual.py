@@ -3,29 +3,29 @@
 from collections.abc import Iterator
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.residual_report import Description, most_excited_record
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.quantity import nanometres, significant
-from afm_scan_ros.report.style import (
+from afm_scan_ros.report.picture import (
     BLUE,
     DARK_GREY,
-    GREY,
     LIGHT_BLUE,
     LIGHT_ORANGE,
     MICRO,
+    MILLI,
     NANO,
     ORANGE,
-    blank,
-    dense,
-    legend_above,
-    styled,
+    Curve,
+    Mark,
+    Panel,
+    Picture,
+    Shade,
+    Steps,
 )
+from afm_scan_ros.report.quantity import nanometres, significant
 
 LARGE = 0.3
 """Share from which a dependence or a coherence is stated."""
@@ -163,70 +163,122 @@ SHADES = ((ORANGE, LIGHT_ORANGE), (BLUE, LIGHT_BLUE))
 NAMES = ("model", "extended model")
 LABELS = {
     "position": (MICRO, "position in µm"),
-    "speed": (1e3, "speed in mm/s"),
+    "speed": (MILLI, "speed in mm/s"),
     "travel": (MICRO, "travel since the last turning point in µm"),
 }
+HERTZ = "frequency in Hz"
+PICKED = "residual in nm"
+"""Label of what a dependence and a course over time show."""
 
 
-@styled
-def residual_figure(limit: DetectionLimit, *stages: Description) -> Figure:
-    """Draw the residual of one axis in one record: of the model and, if given, the extended one."""
-    figure = blank(9.6, 8.6)
-    ((bands, time), (position, speed), (last, own)) = figure.subplots(3, 2)
-    label = "detection limit"
-    bands.stairs(NANO * limit.rms, _edges(limit), color=DARK_GREY, ls="--", label=label, lw=1.4)
-    for stage, colours, name in zip(stages, SHADES, NAMES, strict=False):
-        bands.stairs(NANO * stage.bands, _edges(limit), color=colours[0], label=name, lw=1.4)
-        seconds = stage.sample_period * np.arange(len(stage.residual), dtype=np.float64)
-        dense(time, seconds, NANO * stage.residual, colours[0], name)
-        _dependence(position, "position", stage, colours, name)
-        _dependence(speed, "speed", stage, colours, name)
-        _line(last, stage, colours, name)
-        _autocorrelation(own, stage, colours[0], name)
-    bands.set(xlabel="frequency in Hz", ylabel="rms by band in nm", xscale="log", yscale="log")
-    _correlation_bands(own, stages[-1])
-    time.set(xlabel="time in s", ylabel="residual in nm")
-    for panel in figure.axes:
-        legend_above(panel, columns=3 if panel is bands else 2)
-    return figure
+def residual_pictures(
+    axis: str, limit: DetectionLimit, *stages: Description
+) -> tuple[Picture, Picture]:
+    """Show the residual of one axis in one record: of the model and, if given, the extended one.
+
+    The first picture has it by band, by frequency and over time, the second by what it depends on.
+    """
+    named = [*zip(stages, SHADES, NAMES, strict=False)]
+    bands = [Steps(_edges(limit), NANO * of.bands, name, c[0]) for of, c, name in named]
+    bands.append(Steps(_edges(limit), NANO * limit.rms, "detection limit", DARK_GREY, dashed=True))
+    record = stages[0].record
+    first = Picture(
+        f"residual_{axis}",
+        f"The residual in {axis} of {record}. Tap a band to see its spectrum.",
+        (
+            [
+                Panel(bands, HERTZ, "rms by band in nm", log="xy", role="bands"),
+                Panel(
+                    [_spectrum(of, colours[0], name) for of, colours, name in named],
+                    "frequency of the spectrum in Hz",
+                    "amplitude in nm",
+                    log="xy",
+                    role="spectrum",
+                ),
+            ],
+            [Panel([_course(*each) for each in named], "time in s", PICKED, level=0.0)],
+        ),
+    )
+    second = Picture(
+        f"dependence_{axis}",
+        f"The residual in {axis} of {record}: by position and speed, mean ± standard deviation; the"
+        " mean line, or by travel where the record has no lines; and its autocorrelation, as its"
+        " range in each interval of lag.",
+        (
+            [_dependence(quantity, named) for quantity in ("position", "speed")],
+            [_lines(named), _correlation_panel(named)],
+        ),
+    )
+    return first, second
 
 
-def _edges(limit: DetectionLimit) -> list[float]:
+Named = list[tuple[Description, tuple[str, str], str]]
+"""Each stage with its colours and its name."""
+
+
+def _edges(limit: DetectionLimit) -> Array:
     """Edges in Hz, the first where a logarithmic axis can begin."""
-    return [limit.edges[1] / 10.0, *limit.edges[1:]]
+    return np.array([limit.edges[1] / 10.0, *limit.edges[1:]])
 
 
-def _dependence(
-    panel: Axes, quantity: str, stage: Description, colours: tuple[str, str], name: str
-) -> None:
-    of, (scale, label) = stage.dependences[quantity], LABELS[quantity]
-    scatter = np.sqrt(np.maximum(of.rms**2 - of.mean**2, 0.0))
-    ends = NANO * (of.mean - scatter), NANO * (of.mean + scatter)
-    panel.fill_between(scale * of.centres, *ends, color=colours[1], alpha=0.3, lw=0)
-    panel.plot(scale * of.centres, NANO * of.mean, color=colours[0], label=f"{name}, mean ± sd")
-    panel.set(xlabel=label, ylabel="residual in nm")
+def _course(of: Description, colours: tuple[str, str], name: str) -> Curve:
+    seconds = of.sample_period * np.arange(len(of.residual), dtype=np.float64)
+    return Curve(seconds, NANO * of.residual, name, colours[0])
 
 
-def _line(panel: Axes, stage: Description, colours: tuple[str, str], name: str) -> None:
-    if stage.sides is None:
-        _dependence(panel, "travel", stage, colours, name)
-        return
-    ways = ("trace", stage.sides.trace), ("retrace", stage.sides.retrace)
-    for (way, values), colour in zip(ways, colours, strict=True):
-        label = f"{way}, {name}"
-        panel.plot(stage.sides.place, NANO * values, color=colour, lw=0.9, label=label)
-    panel.set(xlabel="place along the line", ylabel="mean line's residual in nm")
+def _spectrum(of: Description, colour: str, name: str) -> Curve:
+    """Return the amplitude at each frequency but zero."""
+    count = len(of.residual)
+    amplitude = 2.0 / count * np.abs(rfft(of.residual - of.residual.mean()))
+    return Curve(rfftfreq(count, of.sample_period)[1:], NANO * amplitude[1:], name, colour)
 
 
-def _autocorrelation(panel: Axes, stage: Description, colour: str, name: str) -> None:
-    """Draw the range of the autocorrelation in each of many intervals of lag."""
+def _dependence(quantity: str, named: Named) -> Panel:
+    scale, label = LABELS[quantity]
+    marks: list[Mark] = []
+    for stage, colours, name in named:
+        of = stage.dependences[quantity]
+        scatter = np.sqrt(np.maximum(of.rms**2 - of.mean**2, 0.0))
+        low, high = NANO * (of.mean - scatter), NANO * (of.mean + scatter)
+        marks.append(Shade(scale * of.centres, low, high, "", colours[1]))
+        marks.append(Curve(scale * of.centres, NANO * of.mean, f"{name}, mean ± sd", colours[0]))
+    return Panel(marks, label, PICKED, level=0.0)
+
+
+def _lines(named: Named) -> Panel:
+    if any(stage.sides is None for stage, _, _ in named):
+        return _dependence("travel", named)
+    curves = [
+        Curve(stage.sides.place, NANO * values, f"{way}, {name}", colour)
+        for stage, colours, name in named
+        if stage.sides is not None
+        for way, values, colour in (
+            ("trace", stage.sides.trace, colours[0]),
+            ("retrace", stage.sides.retrace, colours[1]),
+        )
+    ]
+    return Panel(curves, "place along the line", "mean line's residual in nm", level=0.0)
+
+
+def _correlation_panel(named: Named) -> Panel:
+    """Show the range of the autocorrelation in each of many intervals of lag."""
+    marks = [_autocorrelation(stage, colours[0], name) for stage, colours, name in named]
+    own, ends = named[-1][0].own, np.array([marks[0].x[0], marks[0].x[-1]])
+    label = "95 % band, block bootstrap"
+    low, high = (np.full(2, sign * own.bootstrap) for sign in (-1.0, 1.0))
+    band = Shade(ends, low, high, label)
+    white = [
+        Curve(ends, np.full(2, sign * own.white), text, DARK_GREY, dashed=True)
+        for sign, text in ((-1.0, ""), (1.0, "95 % band, white noise"))
+    ]
+    return Panel([band, *marks, *white], "lag in s", "autocorrelation", log="x")
+
+
+def _autocorrelation(stage: Description, colour: str, name: str) -> Shade:
     values = _correlated(stage.residual)
     edges = np.unique(np.geomspace(1, len(values) - 1, LAGS).astype(int))
     low, high = (f.reduceat(values, edges) for f in (np.minimum, np.maximum))
-    panel.fill_between(
-        edges * stage.sample_period, low, high, step="post", color=colour, alpha=0.5, lw=0.8,
-        label=name,
-    )  # fmt: skip
+    return Shade(edges * stage.sample_period, low, high, name, colour)
 
 
 def _correlated(residual: Array) -> Array:
@@ -237,12 +289,3 @@ def _correlated(residual: Array) -> Array:
     products = irfft(np.abs(rfft(centred, size)) ** 2, size)[: count // LONGEST]
     result: Array = products / max(products[0], np.finfo(float).tiny)
     return result
-
-
-def _correlation_bands(panel: Axes, stage: Description) -> None:
-    own = stage.own
-    label = "95 % band, block bootstrap"
-    panel.axhspan(-own.bootstrap, own.bootstrap, color=GREY, alpha=0.35, lw=0, label=label)
-    for sign, text in ((-1.0, None), (1.0, "95 % band, white noise")):
-        panel.axhline(sign * own.white, color="black", lw=0.6, ls=":", label=text)
-    panel.set(xlabel="lag in s", ylabel="autocorrelation", xscale="log", ylim=(-1.05, 1.05))

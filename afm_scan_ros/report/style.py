@@ -9,17 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.picture import BLUE, LIGHT_BLUE, LIGHT_ORANGE, ORANGE
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-NANO, MICRO, MILLI = 1e9, 1e6, 1e3
-"""What a figure multiplies by for nm, µm and ms."""
-
-GREY, DARK_GREY = "#c9ced6", "#6b7280"
-BLUE, LIGHT_BLUE = "#0b5fa5", "#86b6de"
-ORANGE, LIGHT_ORANGE = "#c4501b", "#eaa987"
 
 STYLE: Any = {
     "font.size": 9.0,
@@ -80,12 +73,3 @@ def legend_above(panel: Axes, columns: int = 3) -> None:
             columnspacing=1.0,
             fontsize=8,
         )
-
-
-def dense(panel: Axes, x: Array, y: Array, colour: str, label: str | None = None) -> None:
-    """Draw a long signal by the lowest and the highest sample of each stretch of it."""
-    every = max(1, len(y) // 2000)
-    whole = len(y) // every * every
-    stretches = y[:whole].reshape(-1, every)
-    ends = stretches.min(axis=1), stretches.max(axis=1)
-    panel.fill_between(x[:whole:every], *ends, color=colour, lw=0.6, label=label)

@@ -1,25 +1,36 @@
 """``afm-scan grating``: the model of a scanner without a sensor, from images of a grating."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import click
 from attrs import evolve
 
-from afm_scan_ros.cli.options import FILE, FOLDER, NEW_FILE, positive, refuse_existing, working
+from afm_scan_ros.cli.options import (
+    FIGURES,
+    FILE,
+    FOLDER,
+    NEW_FILE,
+    positive,
+    refuse_existing,
+    working,
+)
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.model import BaseEffects
 from afm_scan_ros.features.images.files.channels import image_channels, words_of
 from afm_scan_ros.features.images.files.formats import WRITTEN, read_image, write_image
 from afm_scan_ros.features.images.identify import ACCURACY, correct_image, identify_from_images
 from afm_scan_ros.features.images.report import (
-    correction_figure,
+    correction_picture,
+    deviation_picture,
+    grating_report,
     grating_table,
     left_out,
     not_separated,
 )
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
-from afm_scan_ros.report.scan_figures import save
+from afm_scan_ros.report.paper import paper_figure, save
 from afm_scan_ros.report.terminal import say
 
 PER_MICROMETRE = 1e6
@@ -66,6 +77,8 @@ SUFFIX = ".gwy"
     type=positive("s"),
     help="Time of trace and retrace together, for files that do not state it.",
 )
+@click.option("--report", type=NEW_FILE, help="Write a report as one HTML file.")
+@FIGURES
 def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     images: tuple[Path, ...],
     pitch: float,
@@ -75,6 +88,8 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     scale: float | None,
     accuracy: float,
     line_time: float | None,
+    report: Path | None,
+    figures: str | None,
 ) -> None:
     """Identify a scanner without a displacement sensor from images of a grating of known pitch.
 
@@ -84,6 +99,8 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     """
     if correct and folder is None:
         raise click.UsageError("--correct needs a folder for the corrected images: give --images")
+    if figures is not None and report is None:
+        raise click.UsageError("--figures are written beside a report: give --report")
     refuse_existing(out, other="file")
     if folder is not None:
         refuse_existing(folder)
@@ -91,24 +108,25 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
 
     given, others = ([_timed(path, line_time) for path in paths] for paths in (images, correct))
     volts_per_metre = PER_MICROMETRE * (scale or 1.0)
-    with working("grating", at_once=False) as report:
-        found = identify_from_images(given, pitch, volts_per_metre, report, 0.01 * accuracy)
+    with working("grating", at_once=False) as progress:
+        found = identify_from_images(given, pitch, volts_per_metre, progress, 0.01 * accuracy)
     found.model.save(out)
     used = found.images
     table = grating_table(used, found.positions, found.figures, found.drift, found.refused)
     table.show()
     effects = found.model.effects["x"]
-    for name, status in effects.each():
-        drive = "µm commanded" if scale is None else "V"
-        known = filter(None, (status_text(status, drive), intervals_text(status)))
-        say(f"x: {name} is {': '.join(known)}.")
-    for sentence in (*left_out(used, found.positions), *not_separated(used, effects)):
+    sentences = list(_known(effects, "µm commanded" if scale is None else "V"))
+    sentences += [*left_out(used, found.positions), *not_separated(used, effects)]
+    sentences += [f"Not used: {reason}." for reason in found.refused]
+    for sentence in sentences:
         say(sentence)
-    for reason in found.refused:
-        say(f"Not used: {reason}.")
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
     held = f"x with what is identified above, and y as a gain{coupled}"
     say(f"{out} holds the model: {held}.")
+    if report is not None:
+        deviation = deviation_picture(used, found.positions)
+        made = grating_report(table, used, found.corrected, deviation, sentences, out)
+        made.write(report, figures)
     if folder is not None:
         table.save(folder)
         for image, better in zip(used, found.corrected, strict=True):
@@ -116,6 +134,13 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         for target, image in zip(targets[len(given) :], others, strict=True):
             _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
         say(f"{folder} holds the corrected images, their pictures and the table.")
+
+
+def _known(effects: BaseEffects, drive: str) -> Iterator[str]:
+    """Say what is known of each effect, over a drive in a unit."""
+    for name, status in effects.each():
+        known = filter(None, (status_text(status, drive), intervals_text(status)))
+        yield f"x: {name} is {': '.join(known)}."
 
 
 def _timed(path: Path, line_time: float | None) -> ScanImage:
@@ -148,4 +173,4 @@ def _write_corrected(target: Path, image: ScanImage, corrected: ScanImage | None
         say(f"{name} is not corrected: the scanner turned back within a line.")
         return
     write_image(target, image_channels(corrected), words_of(corrected))
-    save(correction_figure(name, image, corrected), target.with_suffix(".png"))
+    save(paper_figure(correction_picture(image, corrected)), target.with_suffix(".png"))

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from afm_scan_ros.core.model import BaseEffects, Status
 from afm_scan_ros.core.types import AXES, Array
@@ -14,7 +13,19 @@ from afm_scan_ros.features.images.grating.motion import middles
 from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
 from afm_scan_ros.features.images.grating.rough_motion import FINEST
 from afm_scan_ros.features.images.scan_image import ScanImage
-from afm_scan_ros.report.style import BLUE, MICRO, NANO, ORANGE, blank, styled, zero_line
+from afm_scan_ros.report.page import CommandLine, Report, Section
+from afm_scan_ros.report.paper import paper_figure
+from afm_scan_ros.report.picture import (
+    BLUE,
+    MICRO,
+    NANO,
+    ORANGE,
+    Curve,
+    Map,
+    Panel,
+    PickedLine,
+    Picture,
+)
 from afm_scan_ros.report.table import Row, Table
 
 COLUMNS = {
@@ -35,10 +46,7 @@ SHOWN = 1.0, 99.0
 """Percentiles of the values at which the colours end, so that a spike does not hide the rest."""
 ROWS = "as recorded", "corrected"
 SIDES = "trace", "retrace", "trace minus retrace"
-PANEL = 2.9
-"""Width of a panel in inches."""
-AROUND = 1.7
-"""Height of titles, labels and colour bars in inches."""
+X = "x in µm"
 
 
 def grating_table(
@@ -59,7 +67,9 @@ def grating_table(
     title = "What the images show of the scanner"
     if refused:
         title += f" (not used: {'; '.join(refused)})"
-    return Table("grating", title, COLUMNS, rows, lambda: deviation_figure(images, positions))
+    return Table(
+        "grating", title, COLUMNS, rows, lambda: paper_figure(deviation_picture(images, positions))
+    )
 
 
 def _row(image: str, figure: ImageQuantity) -> Row:
@@ -116,68 +126,119 @@ def _followed(image: ScanImage) -> float:
     return 1.0 / (FINEST * pixel)
 
 
-@styled
-def deviation_figure(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Figure:
-    """Draw how far x and y of each image are from the commanded positions."""
-    figure = blank(9.6, 3.2 * len(images))
-    panels = figure.subplots(len(images), 2, squeeze=False)
-    for row, image, each in zip(panels, images, positions, strict=True):
+def deviation_picture(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Picture:
+    """Show how far x and y of each image are from the commanded positions."""
+    rows = []
+    for image, each in zip(images, positions, strict=True):
         ranges, name = (image.range_x, image.range_y), Path(image.name).name
-        for axis, panel, size, count in zip(
-            AXES, row, ranges, (image.pixels, image.lines), strict=True
-        ):
-            commanded = 0.5 * size * middles(count)
-            for place, colour, width, side in (  # the thinner one shows where they coincide
-                (each.trace, BLUE, 2.0, "trace"),
-                (each.retrace, ORANGE, 0.8, "retrace"),
-            ):
-                number = AXES.index(axis)
-                moved = place[..., number].mean(axis=number) - commanded
-                panel.plot(MICRO * commanded, MICRO * moved, color=colour, lw=width, label=side)
-            zero_line(panel)
-            panel.set(
-                xlabel=f"commanded {axis} in µm", ylabel=f"actual minus commanded {axis} in µm"
-            )
-            panel.set_title(f"{name}: {axis}, mean over the {MEANS[axis]}")
-            panel.legend()
-    return figure
+        row = []
+        for axis, size, count in zip(AXES, ranges, (image.pixels, image.lines), strict=True):
+            number, commanded = AXES.index(axis), 0.5 * size * middles(count)
+            curves = [
+                Curve(MICRO * commanded, MICRO * (place - commanded), side, colour, width)
+                for place, colour, width, side in (  # the thinner one shows where they coincide
+                    (each.trace[..., number].mean(axis=number), BLUE, 2.0, "trace"),
+                    (each.retrace[..., number].mean(axis=number), ORANGE, 0.8, "retrace"),
+                )
+            ]
+            label = f"actual minus commanded {axis} in µm"
+            title = f"{name}: {axis}, mean over the {MEANS[axis]}"
+            row.append(Panel(curves, f"commanded {axis} in µm", label, title, level=0.0))
+        rows.append(row)
+    return Picture("deviation", "How far x and y are from the commanded positions.", rows)
 
 
-@styled
-def correction_figure(title: str, before: ScanImage, after: ScanImage) -> Figure:
-    """Draw trace, retrace and their difference of an image, before and after its correction.
+def correction_picture(before: ScanImage, after: ScanImage) -> Picture:
+    """Show trace, retrace and their difference of an image, before and after its correction.
 
     The parabola in x and y that fits an image best is subtracted. Both rows have the same colours.
     Both images hold a retrace.
     """
-    images = before, after
-    height = len(ROWS) * PANEL * before.range_y / before.range_x + AROUND
-    figure = blank(9.6, height, title)
-    panels = figure.subplots(len(ROWS), len(SIDES))
-    right = MICRO * max(before.range_x, after.range_x)
-    top = MICRO * max(before.range_y, after.range_y)
     factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
-    rows = [_images(image, factor) for image in images]
-    least, most = _percentiles(values for row in rows for values in row[:2])
+    rows = [_images(image, factor) for image in (before, after)]
+    heights = _percentiles(values for row in rows for values in row[:2])
     widest = _percentiles(np.abs(row[2]) for row in rows)[1]
-    colours = [("afmhot", least, most)] * 2 + [("RdBu_r", -widest, widest)]
-    shown = []
-    for (row, column), panel in np.ndenumerate(panels):
-        x, y = MICRO * images[row].range_x, MICRO * images[row].range_y
-        cmap, low, high = colours[column]
-        place = {"extent": (0.0, x, 0.0, y), "origin": "lower"}
-        shown.append(panel.imshow(rows[row][column], cmap=cmap, vmin=low, vmax=high, **place))
-        panel.set(xlim=(0.0, right), ylim=(0.0, top), xlabel="x in µm", ylabel="y in µm")
-        panel.set_title(f"{SIDES[column]}, {ROWS[row]}")
-        panel.label_outer()
-    for drawn, of, what in (
-        (shown[0], panels[:, :2], f"{before.channel} without its parabola"),
-        (shown[2], panels[:, 2:], "trace minus retrace"),
-    ):
-        figure.colorbar(
-            drawn, ax=of, label=f"{what}, {unit}", location="bottom", extend="both", aspect=30
+    name = Path(before.name).name
+    maps = [
+        [
+            *(_map(image, values, unit, *heights) for values in row[:2]),
+            _map(image, row[2], unit, -widest, widest, signed=True),
+        ]
+        for image, row in zip((before, after), rows, strict=True)
+    ]
+    panels = [
+        [Panel([of], X, "y in µm", f"{side}, {state}") for of, side in zip(row, SIDES, strict=True)]
+        for row, state in zip(maps, ROWS, strict=True)
+    ]
+    lines = [
+        Panel(
+            [
+                PickedLine(of, side, colour)
+                for of, side, colour in zip(row, SIDES[:2], (BLUE, ORANGE), strict=False)
+            ],
+            X,
+            f"{before.channel} in {unit}",
+            f"a line, {state}",
         )
-    return figure
+        for row, state in zip(maps, ROWS, strict=True)
+    ]
+    caption = (
+        f"{name} as it was recorded and as the model corrects it, without its parabola. Tap an"
+        " image to see the line there."
+    )
+    return Picture(Path(before.name).stem, caption, [*panels, lines], title=name)
+
+
+def _map(
+    image: ScanImage, values: Array, unit: str, low: float, high: float, *, signed: bool = False
+) -> Map:
+    right, top = MICRO * image.range_x, MICRO * image.range_y
+    return Map(values, 0.0, right, 0.0, top, unit, low, high, signed)
+
+
+def grating_report(
+    table: Table,
+    images: Sequence[ScanImage],
+    corrected: Sequence[ScanImage | None],
+    deviation: Picture,
+    sentences: Sequence[str],
+    model: Path,
+) -> Report:
+    """Return the report on a scanner identified from ``images``.
+
+    ``sentences`` say what the ``model`` holds, and what the images cannot tell.
+    """
+    pairs = [(a, b) for a, b in zip(images, corrected, strict=True) if b is not None]
+    pictures = [*(correction_picture(a, b) for a, b in pairs), deviation]
+    return Report(
+        title="A scanner identified from images of a grating",
+        answer=[*_answers(pairs), f"{model} holds the model, by which other images are corrected."],
+        picture=pictures[0],
+        next_steps=[
+            *sentences,
+            CommandLine(
+                "Correct another image of this scanner.",
+                "afm-scan grating IMAGE --pitch PITCH --out MODEL --correct OTHER --images FOLDER",
+            ),
+        ],
+        evidence=[
+            Section("Figures of each image, with 95 % intervals", [table.text()]),
+            Section("Other images, and the deviation of the positions", pictures[1:]),
+        ],
+    )
+
+
+def _answers(pairs: Sequence[tuple[ScanImage, ScanImage]]) -> Iterator[str]:
+    """Say how far trace and retrace of the first image differ, before and after correction."""
+    for before, after in pairs[:1]:
+        factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
+        differences = [
+            f"{np.sqrt(np.mean(_images(image, factor)[2] ** 2)):.3g}" for image in (before, after)
+        ]
+        yield (
+            f"Trace and retrace of {Path(before.name).name} differ by {differences[0]} {unit} rms"
+            f" as recorded, and by {differences[1]} {unit} after correction."
+        )
 
 
 def _images(image: ScanImage, factor: float) -> tuple[Array, Array, Array]:

@@ -1,12 +1,13 @@
 """``afm-scan learn``: repeat a scan, and learn a correction of its reference."""
 
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import click
 
 from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
-from afm_scan_ros.cli.options import CONFIG, FILE, FOLDER, refuse_existing, working
+from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing, working
 from afm_scan_ros.cli.scan import drive_limits_of
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -18,13 +19,12 @@ from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.features.learning.report import (
     Taught,
     learning_document,
-    learning_page,
+    learning_report,
     learning_text,
     taught_text,
 )
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
@@ -52,8 +52,16 @@ HEADING = "A scanner's model with the effects that 'afm-scan learn' identified."
 @click.option(
     "--diagnose", "diagnosed", is_flag=True, help="Diagnose what the model lacks by the scans."
 )
+@FIGURES
 def learn(
-    spec: Path, model: Path, driven: DrivenScanner, scans: int, out: Path, *, diagnosed: bool
+    spec: Path,
+    model: Path,
+    driven: DrivenScanner,
+    scans: int,
+    out: Path,
+    *,
+    diagnosed: bool,
+    figures: str | None,
 ) -> None:
     """Repeat a scan, and learn a correction of its reference from the measured errors.
 
@@ -81,11 +89,12 @@ def learn(
         failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
     save_learned(out / "learned.npz", loop.best_of(done).correction, base)
-    _write(out, done, None, made, failure)
+    write = partial(_write, out, done, of=made, failure=failure, figures=figures)
+    write(None)
     show(learning_text(done))
     if diagnosed and not failure:
         taught = _taught(base, done, out, made)
-        _write(out, done, taught, made, failure)
+        write(taught)
         show(taught_text(taught))
     say(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
     if isinstance(ended, KeyboardInterrupt):
@@ -107,9 +116,14 @@ def _taught(
 
 
 def _write(
-    out: Path, done: list[loop.LearningScan], taught: Taught | None, of: Provenance, failure: str
+    out: Path,
+    done: list[loop.LearningScan],
+    taught: Taught | None,
+    of: Provenance,
+    failure: str,
+    figures: str | None,
 ) -> None:
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
-    write_text(out / "report.html", learning_page(done, taught, of, failure))
+    learning_report(done, taught, of, failure).write(out / "report.html", figures)

@@ -2,25 +2,23 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from attrs import frozen
-from matplotlib.figure import Figure
 
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.metrics import Figure as ErrorFigure
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.features.learning.loop import LearningScan, best_of
-from afm_scan_ros.report import html
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
+from afm_scan_ros.report.page import CommandLine, Report, Section
+from afm_scan_ros.report.picture import BLUE, NANO, ORANGE, Curve, Panel, Picture
 from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
-from afm_scan_ros.report.scan_figures import TwoScans, error_figure
-from afm_scan_ros.report.style import BLUE, NANO, ORANGE, blank, styled
+from afm_scan_ros.report.scan_pictures import TwoScans, error_picture
 from afm_scan_ros.report.table import Part, Rows
 
 Document = dict[str, Any]
@@ -35,7 +33,6 @@ HEADINGS = (
     "next error over\nthis, at most",
     "share of error\nlearned",
 )
-TEMPLATES = Path(__file__).parent / "templates"
 DISPLACEMENTS = ("measured", "true")
 
 
@@ -136,62 +133,105 @@ def learning_document(scans: Sequence[LearningScan], taught: Taught | None) -> D
     return document
 
 
-def learning_page(
+METHOD = (
+    "The first two scans have one drive. Their difference is what does not repeat. Each later scan"
+    " has a corrected reference. All limits of the drive hold for it. The error is achieved minus"
+    " desired displacement, rms about zero, without the first line. A frequency is learned where"
+    " the response is known well enough that its error cannot grow, with a probability of 95 %. The"
+    " bound on the next error follows from it."
+)
+
+
+def learning_report(
     scans: Sequence[LearningScan], taught: Taught | None, of: Provenance, failure: str = ""
-) -> str:
-    """Return the report as a self-contained HTML page; ``failure`` ended the scans, if any."""
+) -> Report:
+    """Return the report on the scans; ``failure`` ended them, if any."""
     best = best_of(list(scans))
-    return html.page(
-        "learning.html",
-        TEMPLATES,
-        failure=failure,
-        learned=learning_text(scans),
-        history=html.png(history_figure(scans)),
-        spectrum=html.png(spectrum_figure(best)) if best.steps else None,
-        lines=html.png(error_figure(_two(scans[0], best))),
-        taught=taught and taught_text(taught),
-        next_steps=taught and next_steps(taught.diagnosis),
+    table, *sentences = learning_text(scans)
+    kind = "True" if scans[0].scan.knows_true else "Measured"
+    sections = [Section("Errors of each scan", [table, *sentences])]
+    sections.append(Section("Error by scan", [history_picture(scans)]))
+    if best.steps:
+        sections.append(Section("What was learned, by frequency", [spectrum_picture(best)]))
+    if taught is not None:
+        sections.append(Section("What the model lacks", list(taught_text(taught))))
+    return Report(
+        title="A scan learned from its errors",
+        answer=list(_answer(scans, best)),
+        picture=error_picture("lines", _two(scans[0], best), kind),
+        next_steps=[*_next(), *(next_steps(taught.diagnosis) if taught else ())],
+        evidence=[*sections, Section("Method", [METHOD])],
+        warnings=[f"Learning ended early: {failure}."] if failure else [],
         provenance=of,
     )
 
 
-@styled
-def history_figure(scans: Sequence[LearningScan]) -> Figure:
-    """Draw the rms error of each axis by scan, measured and, where it is known, true."""
-    figure = blank(9.6, 3.2)
-    numbers = np.arange(1, len(scans) + 1)
-    for panel, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
+def _answer(scans: Sequence[LearningScan], best: LearningScan) -> Iterator[str]:
+    first = scans[0]
+    errors = [
+        f"from {nanometres(first.errors[axis])} to {nanometres(best.errors[axis])} nm rms in {axis}"
+        for axis in AXES
+    ]
+    yield f"The learned correction changes the measured error {' and '.join(errors)}."
+    tests = [done.convergence for done in scans if done.convergence]
+    if tests:
+        noise = [f"{nanometres(tests[-1][axis].noise)} nm rms in {axis}" for axis in AXES]
+        yield f"What does not repeat from scan to scan is {' and '.join(noise)}."
+    else:
+        yield f"The best is scan {_number(scans, best)} of {len(scans)}."
+
+
+def _next() -> Iterator[CommandLine]:
+    yield CommandLine(
+        "Make the same scan with the correction.",
+        "afm-scan scan --spec SCAN --model MODEL --learned learned.npz --bag BAG",
+    )
+    yield CommandLine(
+        "Find out which effect the model lacks, so that other scans are better too.",
+        "afm-scan learn --diagnose --out OTHER",
+    )
+
+
+def history_picture(scans: Sequence[LearningScan]) -> Picture:
+    """Show the rms error of each axis by scan, measured and, where it is known, true."""
+    numbers = np.arange(1.0, len(scans) + 1.0)
+    panels = []
+    for axis in AXES:
         errors = [_errors(done, axis) for done in scans]
+        curves = []
         for name, colour, each in zip(
             DISPLACEMENTS, (ORANGE, BLUE), zip(*errors, strict=True), strict=True
         ):
             rms = [NANO * one.rms for one in each if one is not None]
             if len(rms) == len(scans):
-                panel.semilogy(numbers, rms, "o-", color=colour, label=name)
-        panel.set(xlabel="scan", title=f"{axis}, at constant speed")
-        panel.set_xticks(numbers)
-    figure.axes[0].set_ylabel("error, rms in nm")
-    figure.axes[0].legend()
-    return figure
+                curves.append(Curve(numbers, np.array(rms), name, colour))
+                curves.append(Curve(numbers, np.array(rms), "", colour, dots=True))
+        panels.append(Panel(curves, "scan", "error in nm rms", f"{axis}, at constant speed", "y"))
+    return Picture("history", "Error by scan. Measured errors hold noise.", [panels])
 
 
-@styled
-def spectrum_figure(done: LearningScan) -> Figure:
-    """Draw the correction and the response by frequency."""
-    figure = blank(9.6, 3.2)
-    left, right = figure.subplots(1, 2)
+def spectrum_picture(done: LearningScan) -> Picture:
+    """Show the correction and the response by frequency."""
+    corrections, responses = [], []
     for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True):
         step = done.steps[axis]
         used = np.abs(step.correction) > 0.0
         used[0] = False
         hertz = step.frequencies[used]
         amplitude = 2.0 * NANO * np.abs(step.correction[used]) / step.length
-        left.loglog(hertz, amplitude, ".", ms=1.5, color=colour, label=axis)
-        right.loglog(hertz, np.abs(step.response.ratio[used]), ".", ms=1.5, color=colour)
-    left.set(xlabel="frequency in Hz", ylabel="correction in nm")
-    right.set(xlabel="frequency in Hz", ylabel="scanner over model")
-    left.legend(markerscale=6)
-    return figure
+        corrections.append(Curve(hertz, amplitude, axis, colour, dots=True))
+        ratio = np.abs(step.response.ratio[used])
+        responses.append(Curve(hertz, ratio, axis, colour, dots=True))
+    caption = (
+        "Left: the correction by frequency. Right: response of the scanner over its model, as the"
+        " scans show it, where a correction was learned."
+    )
+    label = "frequency in Hz"
+    row = [
+        Panel(corrections, label, "correction in nm", log="xy"),
+        Panel(responses, label, "scanner over model", log="xy"),
+    ]
+    return Picture("spectrum", caption, [row])
 
 
 def _scan(done: LearningScan) -> Document:

@@ -25,18 +25,23 @@ from afm_scan_ros.model import Model, load_model
 
 @frozen
 class Assignment:
-    """A bag to diagnose: its path, instrument and ``identity``, its model's file and its digest."""
+    """A bag to diagnose: its path, instrument and ``identity``, its model's file and its digest.
+
+    The diagnosis is written to a ``report_folder``, unless there is none.
+    """
 
     bag: str
     instrument: str
     identity: str
     model_file: str
     model: str
+    report_folder: str = ""
 
     def is_of(self, kept: Recording | None) -> bool:
         """Whether this is what was diagnosed already, by this version."""
         known = kept and (kept.identity, kept.model, kept.version)
-        return known == (self.identity, self.model, version())
+        same = known == (self.identity, self.model, version())
+        return same and (not self.report_folder or Path(self.report_folder).exists())
 
     def failed(self, error: object) -> Recording:
         """Return the row of a bag that could not be diagnosed, and why."""
@@ -70,6 +75,8 @@ def survey_bag(assigned: Assignment) -> Recording:
         record = read_record(assigned.bag)
         model = _model(assigned.model_file, assigned.model)
         found = diagnose(model, [record], parallel=False)  # other bags keep the other cores busy
+        if assigned.report_folder:
+            found.save(assigned.report_folder)
         return _with_diagnosis(_with_record(begun, record), found)
     except (InputError, ScanError) as error:
         return assigned.failed(error)

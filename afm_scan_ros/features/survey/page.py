@@ -1,22 +1,30 @@
 """The report on a survey: sentences, rows, figures and the page."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
-from afm_scan_ros.features.survey.recording import EffectValue, NamedEffect, Recording
-from afm_scan_ros.report import html
+from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
+from afm_scan_ros.report.page import CommandLine, Listing, Report, Section
+from afm_scan_ros.report.picture import (
+    BLUE,
+    LIGHT_BLUE,
+    ORANGE,
+    Bars,
+    Curve,
+    Mark,
+    Panel,
+    Picture,
+    Stretches,
+)
 from afm_scan_ros.report.provenance import UNSTATED
-from afm_scan_ros.report.quantity import quantity, significant
-from afm_scan_ros.report.style import BLUE, GREY, LIGHT_BLUE, ORANGE, blank, styled
+from afm_scan_ros.report.quantity import nanometres, quantity, significant
 from afm_scan_ros.report.table import Part, Rows
 
 NANO = 1e-9
@@ -27,6 +35,10 @@ QUANTITIES = {
     "creep": "creep of {}",
     "residual_ratio": "residual of {} over its detection limit",
 }
+LOW = 0.6
+"""Height of a row, as there are many."""
+MOST_ADVISED = 3
+"""Instruments that changed for which a command is given."""
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 
 
@@ -77,37 +89,129 @@ def summary(found: Survey) -> Iterator[Part]:
     yield from map(alert, found.changed.values())
 
 
-def page(found: Survey, now: datetime) -> str:
-    """Return the report as a self-contained HTML page."""
-    instruments = [
-        {
-            "name": name,
-            "trends": _trends(some, found.changed.get(name, [])),
-            "recordings": sorted(some, key=lambda each: (each.recorded, each.bag)),
-            "models": sorted({each.model for each in some}),
-        }
-        for name, some in by_instrument(found.recordings)
-    ]
-    return html.page(
-        "survey.html",
-        Path(__file__).parent / "templates",
-        summary=summary(found),
-        changes=found.changes,
-        false_alarm=found.false_alarm,
-        instruments=instruments,
-        written=now,
-        versions=sorted({each.version for each in found.recordings}),
-        what=_what,
-        factor=_factor,
-        time=_time,
-        effect=_effect_text,
+METHOD = (
+    "Each recording is diagnosed alone. In addition, the gain, the first resonance, its damping"
+    " ratio and the gains of creep are estimated together, each divided by the model's. The"
+    " estimates assume that no other effect is there. The residual is the rms over the bands of"
+    " residual divided by detection limit. A series has changed if its means before and after some"
+    " time differ by more than its scatter or the model's error. A survey of unchanged instruments"
+    " reports a change with a probability of {:.3g} at most. A diagnosis may name no effect where"
+    " the series shows a change: it sees one recording alone."
+)
+CHANGES = ("instrument", "what changed", "by a factor of", "between", "and", "diagnosis")
+LISTED = (
+    "recording", "instrument", "time", "verdict", "effects", "residual over limit",
+    "residual, nm", "detection limit, nm", "parameters of the effects", "samples", "bag",
+)  # fmt: skip
+SHOWN = 6
+"""Columns of the table of recordings; the others are seen in a row that is opened."""
+
+
+def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> Report:
+    """Return the report; ``reports`` are the addresses of those of single bags."""
+    recordings = found.recordings
+    versions = sorted({each.version for each in recordings})
+    models = sorted({each.model for each in recordings})
+    changes = [Rows(CHANGES, [_change_row(each) for each in found.changes])]
+    listing = Listing(LISTED, [_listed(each, reports) for each in recordings], SHOWN)
+    instruments = [_instrument_row(n, some, found) for n, some in by_instrument(recordings)]
+    return Report(
+        title="Survey of recordings",
+        answer=list(_answer(found)),
+        picture=_trends(found),
+        next_steps=list(_next(found)),
+        evidence=[
+            Section("Recordings", [listing], opened=True),
+            *([Section("Changes", changes)] if found.changes else []),
+            Section("Instruments", [Rows(SURVEYED, instruments)]),
+            Section("Method", [METHOD.format(found.false_alarm)]),
+            Section(
+                "Provenance",
+                [
+                    f"Written {now:%Y-%m-%dT%H:%M:%SZ} by afm_scan_ros {', '.join(versions)}.",
+                    f"SHA-256 of the model's files: {', '.join(models)}",
+                ],
+            ),
+        ],
     )
 
 
-def _trends(recordings: Sequence[Recording], changes: Sequence[Change]) -> bytes | None:
-    """Draw the trends of an instrument; None where it has none."""
-    series = courses(recordings)
-    return html.png(_figure(series, changes)) if series else None
+def _answer(found: Survey) -> Iterator[str]:
+    """Yield how many instruments changed and which, or that none did."""
+    count = len(list(by_instrument(found.recordings)))
+    failed = f", of which {len(found.failed)} could not be diagnosed" if found.failed else ""
+    yield (
+        f"{len(found.changed)} of {count} instruments changed, by {len(found.recordings):,}"
+        f" recordings{failed}."
+    )
+    for some in list(found.changed.values())[:1]:
+        yield f"The surest: {alert(some).removeprefix('alert: ')}."
+
+
+def _next(found: Survey) -> Iterator[CommandLine]:
+    for name, some in list(found.changed.items())[:MOST_ADVISED]:
+        after = [
+            r for r in found.recordings if r.instrument == name and r.recorded >= some[0].before
+        ]
+        bags = " ".join(each.bag for each in after[:2]) or "BAG"
+        yield CommandLine(
+            f"Find out what changed of {name}, by recordings after the change together.",
+            f"afm-scan diagnose {bags} --model MODEL --out diagnosis",
+        )
+    yield CommandLine(
+        "Go on as recordings come in, with a report of each.",
+        "afm-scan survey FOLDER --model MODEL --out SURVEY --reports --watch",
+    )
+
+
+def _change_row(change: Change) -> tuple[str, ...]:
+    ends = _time(change.after), _time(change.before)
+    named = ", ".join(change.effects) or "names no effect"
+    return change.instrument, _what(change), _factor(change), *ends, named
+
+
+def _listed(each: Recording, reports: Mapping[str, str]) -> list[str | float]:
+    """Return a row of the table of recordings: the address of its report, and a cell a column."""
+    ratios = [q.value for axis in each.axes for q in axis.estimates if q.name == RESIDUAL]
+    return [
+        reports.get(each.bag, ""),
+        Path(each.bag).name,
+        each.instrument,
+        _time(each.recorded),
+        "not diagnosed" if each.error else each.verdict.replace("_", " "),
+        each.error or ", ".join(f"{e.name} of {e.axis}" for e in each.effects) or "none",
+        float(f"{max(ratios):.4g}") if ratios else "",
+        ", ".join(f"{axis.axis} {nanometres(axis.residual)}" for axis in each.axes),
+        ", ".join(f"{axis.axis} {nanometres(axis.detection_limit)}" for axis in each.axes),
+        "; ".join(map(_effect_text, each.effects)),
+        each.samples,
+        each.bag,
+    ]
+
+
+def _trends(found: Survey) -> Picture | None:
+    """Show the trends of an instrument, one that changed if any did; None where there are none."""
+    series = {name: courses(some) for name, some in by_instrument(found.recordings)}
+    known = {name: each for name, each in series.items() if each}
+    if not known:
+        return None
+    ordered = sorted(known, key=lambda name: name not in found.changed)
+    axes = sorted({axis for each in known.values() for axis, _ in each})
+    names = [q for q in QUANTITIES if any(q == name for each in known.values() for _, name in each)]
+    variants = {
+        instrument: [
+            [_trend(known[instrument], found, instrument, axis, name) for axis in axes]
+            for name in names
+        ]
+        for instrument in ordered
+    }
+    caption = (
+        "Points are the values of the recordings, over the model's. Bars are 95 % intervals: dark"
+        " by the sensor's noise alone, light with the model's error, which recordings of the same"
+        " scan share. The grey line is the model, or the detection limit. Orange is the time of a"
+        " change (95 % credible interval)."
+    )
+    return Picture("trends", caption, variants[ordered[0]], LOW, variants=variants)
 
 
 def _instrument_row(name: str, some: Sequence[Recording], found: Survey) -> tuple[str, ...]:
@@ -144,39 +248,28 @@ def _time(stamp: int) -> str:
     return f"{datetime.fromtimestamp(NANO * stamp, UTC):%Y-%m-%d %H:%M}" if stamp else UNSTATED
 
 
-@styled
-def _figure(series: dict[tuple[str, str], Course], changes: Sequence[Change]) -> Figure:
-    """Draw a panel for each quantity, a column for each axis."""
-    axes = sorted({axis for axis, _ in series})
-    names = [name for name in QUANTITIES if any(key[1] == name for key in series)]
-    figure = blank(4.2 * len(axes), 1.3 * len(names))
-    panels = figure.subplots(len(names), len(axes), sharex=True, squeeze=False)
-    for row, name in zip(panels, names, strict=True):
-        for panel, axis in zip(row, axes, strict=True):
-            panel.set_title(QUANTITIES[name].format(axis))
-            if (axis, name) in series:
-                _trend(panel, series[axis, name])
-            else:
-                panel.text(0.0, 0.5, "not determined", transform=panel.transAxes)
-                panel.yaxis.set_visible(False)
-            for each in changes:
-                if (each.axis, each.name) == (axis, name):
-                    panel.axvspan(*_dates(each.after, each.before), color=ORANGE, alpha=0.4, lw=0)
-    for panel in panels[-1]:
-        panel.xaxis_date()
-    return figure
-
-
-def _trend(panel: Axes, course: Course) -> None:
+def _trend(
+    series: dict[tuple[str, str], Course], found: Survey, instrument: str, axis: str, name: str
+) -> Panel:
+    """Show a quantity of an axis of an instrument over time; nothing where it is not determined."""
+    course = series.get((axis, name), [])
     times = _dates(*(recording.recorded for recording, _ in course))
     values = np.array([estimate.value for _, estimate in course])
-    whole = np.array([estimate.interval for _, estimate in course])
+    whole = np.array([estimate.interval for _, estimate in course]).reshape(-1, 2)
     noise = np.exp(1.96 * np.array([estimate.noise for _, estimate in course]))
-    panel.axhline(1.0, color=GREY, lw=0.6, zorder=0)
-    panel.vlines(times, *whole.T, color=LIGHT_BLUE, lw=0.8)
-    panel.vlines(times, values / noise, values * noise, color=BLUE, lw=1.6)
-    panel.plot(times, values, "o", color=BLUE, ms=2.5)
-    panel.ticklabel_format(axis="y", useOffset=False)
+    changed = [
+        _dates(each.after, each.before)
+        for each in found.changed.get(instrument, [])
+        if (each.axis, each.name) == (axis, name)
+    ]
+    marks: list[Mark] = [
+        Stretches(changed, "", ORANGE),
+        Bars(times, whole[:, 0], whole[:, 1], "", LIGHT_BLUE),
+        Bars(times, values / noise, values * noise, "", BLUE, 2.0),
+        Curve(times, values, "", BLUE, dots=True),
+    ]
+    label = QUANTITIES[name].format(axis)
+    return Panel(marks, "time", "over the model's", label, level=1.0, dates=True)
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:

@@ -12,21 +12,20 @@ from re import Pattern
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.options import FOLDER, RECORD, grouped, positive, working
+from afm_scan_ros.cli.options import FIGURES, FOLDER, RECORD, grouped, positive, working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag
 from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
 from afm_scan_ros.features.survey.changes import changes
 from afm_scan_ros.features.survey.folder import TABLE, SurveyFolder, require_parquet
-from afm_scan_ros.features.survey.page import Survey, alert, page, summary
+from afm_scan_ros.features.survey.page import Survey, alert, summary, survey_report
 from afm_scan_ros.features.survey.recording import Recording
 from afm_scan_ros.features.survey.workers import Outcome, WorkerOptions, worker_options
-from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import load_model
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 
-PAGE = "survey.html"
+PAGE, REPORTS = "survey.html", "reports"
 FALSE_ALARM = 0.01
 PLACE = "{instrument}"
 Run = Callable[[Sequence[Assignment]], Iterator[Outcome[Assignment, Recording]]]
@@ -82,6 +81,8 @@ class Surveyor:
     folder: SurveyFolder
     false_alarm: float
     run: Run
+    reports: bool = False
+    figures: str | None = None
 
     def survey(self, bags: Sequence[FoundBag]) -> Survey:
         """Diagnose what is new among bags; write table and page of all that is kept.
@@ -107,12 +108,27 @@ class Surveyor:
         instrument = instrument_of(bag.path, self.rule)
         file = Path(self.model.replace(PLACE, instrument))
         known = model_digest(file) if file.exists() else ""
-        return Assignment(str(bag.path.absolute()), instrument, bag.identity, str(file), known)
+        folder = str(self._report_folder(bag.identity)) if self.reports else ""
+        return Assignment(
+            str(bag.path.absolute()), instrument, bag.identity, str(file), known, folder
+        )
+
+    def _report_folder(self, identity: str) -> Path:
+        return self.folder.path / REPORTS / identity[:16]
+
+    def _reports(self, recordings: Sequence[Recording]) -> dict[str, str]:
+        """Addresses of the reports of single recordings, by bag, as far as they are written."""
+        files = {r.bag: self._report_folder(r.identity) / "report.html" for r in recordings}
+        root = self.folder.path
+        return {
+            bag: file.relative_to(root).as_posix() for bag, file in files.items() if file.exists()
+        }
 
     def _written(self, recordings: Sequence[Recording]) -> Survey:
         found = Survey(recordings, changes(recordings, self.false_alarm), self.false_alarm)
         self.folder.save_table(recordings)
-        write_text(self.folder.path / PAGE, page(found, datetime.now(UTC)))
+        made = survey_report(found, self._reports(recordings), datetime.now(UTC))
+        made.write(self.folder.path / PAGE, self.figures)
         return found
 
 
@@ -139,9 +155,15 @@ class Surveyor:
     show_default=True,
     help="Probability, at most, that a survey of unchanged instruments reports a change.",
 )
+@click.option(
+    "--reports",
+    is_flag=True,
+    help="Write the report of each recording too, to which the page links; this takes longer.",
+)
+@FIGURES
 @worker_options
 @watch_options
-def survey(
+def survey(  # noqa: PLR0913 - click hands over one parameter an option
     bags: tuple[Path, ...],
     model: str,
     out: Path,
@@ -149,6 +171,9 @@ def survey(
     false_alarm: float,
     workers: WorkerOptions,
     watching: WatchOptions | None,
+    *,
+    reports: bool,
+    figures: str | None,
 ) -> None:
     """Diagnose any number of recordings; say which instruments changed, and when.
 
@@ -161,9 +186,8 @@ def survey(
     require_parquet()
     if PLACE not in model:
         load_model(Path(model))
-    surveyor = Surveyor(
-        model, rule, SurveyFolder(out), false_alarm, partial(workers.run, survey_bag)
-    )
+    run = partial(workers.run, survey_bag)
+    surveyor = Surveyor(model, rule, SurveyFolder(out), false_alarm, run, reports, figures)
     found = _watched(surveyor, bags, watching) if watching else _surveyed(surveyor, bags)
     if found is None:
         return

@@ -11,7 +11,7 @@ from rich.progress import track
 
 from afm_scan_bench.paper.page import HEADINGS, document, page
 from afm_scan_bench.paper.section import Section
-from afm_scan_ros.report.scan_figures import save
+from afm_scan_ros.report.paper import save
 from afm_scan_ros.report.table import Rows
 
 IMAGES = ("figure_9", "figure_10", "figure_11")

@@ -13,8 +13,9 @@ from afm_scan_ros.core.identification.local_response import FrequencyResponse, l
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.fit_figures import COHERENCE
-from afm_scan_ros.report.style import BLUE, LIGHT_BLUE, styled
+from afm_scan_ros.report.fit_pictures import COHERENCE
+from afm_scan_ros.report.picture import BLUE, LIGHT_BLUE
+from afm_scan_ros.report.style import styled
 
 POINTS = 2000
 TEXT = (

@@ -1,13 +1,17 @@
 """The report: every section on one page, and its numbers as JSON."""
 
+from base64 import b64encode
 from collections.abc import Iterable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from attrs import asdict
+from matplotlib.figure import Figure
 
 from afm_scan_bench.paper.section import Section
 from afm_scan_ros.report import html
+from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Rows
 
 HEADINGS = ("", "paper", "ours")
@@ -20,12 +24,20 @@ def page(sections: Iterable[Section]) -> str:
             "title": each.title,
             "compared": Rows(HEADINGS, [row.row() for row in each.compared]),
             "text": each.text,
-            "pictures": [(drawn.caption, html.png(drawn.figure)) for drawn in each.pictures],
+            "pictures": [(drawn.caption, _png(drawn.figure)) for drawn in each.pictures],
             "details": each.details and Rows(each.details[0], each.details[1:]),
         }
         for each in sections
     ]
     return html.page("paper.html", Path(__file__).parent / "templates", sections=parts)
+
+
+@styled
+def _png(figure: Figure) -> str:
+    """Draw a figure as a PNG file, in the characters that a page's address of it has."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=160)
+    return b64encode(stream.getvalue()).decode("ascii")
 
 
 def document(sections: Iterable[Section]) -> dict[str, Any]:

@@ -1,0 +1,154 @@
+"""Pictures of an identification: responses, creep, loops, residuals and discrepancy."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from afm_scan_ros.core.effects.vibration import held
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis
+from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.local_response import Complex
+from afm_scan_ros.core.model import AxisModel
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.picture import (
+    BLUE,
+    DARK_GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    MICRO,
+    NANO,
+    ORANGE,
+    Curve,
+    Mark,
+    Panel,
+    Picture,
+    Steps,
+)
+
+COLOURS = (LIGHT_BLUE, LIGHT_ORANGE, DARK_GREY)
+"""Of records, in turn."""
+COHERENCE = 0.9
+"""Least coherence of a measured line that is drawn."""
+POINTS = 400
+"""Points of a model's curve."""
+HALF_TURN = 180.0
+"""Degrees from one point to the next at which a curve of the phase is cut."""
+HERTZ = "frequency in Hz"
+
+Draw = Callable[[str, FittedAxis], Panel]
+
+
+def fit_picture(found: Identification) -> Picture:
+    """Show each record before and after the fit: its motion, and what the model leaves of it."""
+    return _rows(
+        found,
+        "fit",
+        "Left: rms by band of the motion of a record that was not fitted, and of what the model"
+        " leaves of it. Right: what the model leaves of each record.",
+        _bands,
+        _left,
+    )
+
+
+def response_picture(found: Identification) -> Picture:
+    """Show magnitude and phase of the response to F, of each record and of the model."""
+    return _rows(
+        found,
+        "response",
+        "Response of the displacement to F = H(u), creep and the converter's hold included: by"
+        " local fits to each record, and of the model.",
+        _magnitude,
+        _phase,
+    )
+
+
+def slow_picture(found: Identification) -> Picture:
+    """Show the creep after a step, and the loops of F = H(u)."""
+    caption = "Creep of the model after a step, and the loops of the records."
+    return _rows(found, "slow", caption, _creep, _loops)
+
+
+def _rows(found: Identification, name: str, caption: str, *panels: Draw) -> Picture:
+    rows = [[draw(axis, of) for draw in panels] for axis, of in found.axes.items()]
+    return Picture(name, caption, rows)
+
+
+def _response(model: AxisModel, frequency: Array, sample_period: float) -> Complex:
+    """Complex response (m/V) from F to what the sensor reads, creep included, at Hz."""
+    omega = 2.0 * np.pi * frequency
+    gains, constants = np.array(model.creep.gains), np.array(model.creep.time_constants)
+    creep = 1.0 + np.sum(gains / (1.0 + 1j * omega[:, np.newaxis] * constants), axis=1)
+    return np.asarray(creep * held(model.read_vibration, sample_period).response(omega))
+
+
+def _magnitude(name: str, found: FittedAxis) -> Panel:
+    marks = _responses(found, lambda response: MICRO * np.abs(response))
+    return Panel(marks, HERTZ, "response to F in µm/V", f"{name}: magnitude", "xy")
+
+
+def _phase(name: str, found: FittedAxis) -> Panel:
+    marks = _responses(found, lambda response: np.degrees(np.angle(response)))
+    return Panel(marks, HERTZ, "phase in degrees", f"{name}: phase", "x")
+
+
+def _responses(found: FittedAxis, of: Callable[[Complex], Array]) -> list[Mark]:
+    """Return a figure ``of`` the responses of all records, and of the model over their band."""
+    marks: list[Mark] = []
+    for k, record in enumerate(found.records):
+        measured = record.response
+        clear = measured.coherence > COHERENCE
+        seen = of(measured.response[clear])
+        colour = COLOURS[k % len(COLOURS)]
+        marks.append(Curve(measured.frequency[clear], seen, record.name, colour, dots=True))
+    shortest = min(found.records, key=lambda record: record.sample_period)
+    highest = 0.5 / shortest.sample_period
+    lowest = min(float(r.response.frequency.min(initial=highest)) for r in found.records)
+    frequency = np.geomspace(min(lowest, 0.01 * highest), highest, POINTS)
+    curve = of(_response(found.model, frequency, shortest.sample_period))
+    turned = np.abs(np.diff(curve, prepend=curve[0])) > HALF_TURN
+    return [*marks, Curve(frequency, np.where(turned, np.nan, curve), "model", BLUE)]
+
+
+def _creep(name: str, found: FittedAxis) -> Panel:
+    creep = found.model.creep
+    held_for = np.geomspace(1e-4, 3.0, POINTS) * max(creep.time_constants, default=1.0)
+    grown = -np.expm1(-held_for[:, np.newaxis] / np.array(creep.time_constants))
+    curve = Curve(held_for, 100.0 * grown @ np.array(creep.gains))
+    label = "creep in % of the step"
+    return Panel([curve], "time since a step in s", label, f"{name}: creep after a step", "x")
+
+
+def _loops(name: str, found: FittedAxis) -> Panel:
+    curves = [
+        Curve(r.drive, r.effective, r.name, COLOURS[k % len(COLOURS)], width=0.6)
+        for k, r in enumerate(found.records)
+    ]
+    return Panel(curves, "drive u in V", "effective input F in V", f"{name}: loops")
+
+
+def _left(name: str, found: FittedAxis) -> Panel:
+    curves = [
+        Curve(r.seconds / r.seconds[-1], NANO * r.left, r.name, COLOURS[k % len(COLOURS)])
+        for k, r in enumerate(found.records)
+    ]
+    for one in found.validations:
+        share = np.linspace(0.0, 1.0, len(one.residual))
+        curves.append(Curve(share, NANO * one.residual, f"{one.record}, held out", ORANGE))
+    label = "measured less model in nm"
+    return Panel(curves, "time over the record's length", label, f"{name}: left of each record")
+
+
+def _bands(name: str, found: FittedAxis) -> Panel:
+    steps = []
+    for one in found.validations[:1]:
+        known = one.model_discrepancy
+        lines = {
+            "motion": (known.displacement, ORANGE),
+            "left by the model": (known.rms, BLUE),
+            "sensor noise": (known.noise, DARK_GREY),
+        }
+        edges = np.maximum(known.bands, known.bands[1] / 10.0)
+        for label, (rms, colour) in lines.items():
+            shown = NANO * np.where(np.array(rms) >= min(known.noise), rms, np.nan)
+            steps.append(Steps(edges, shown, label, colour))
+    return Panel(steps, HERTZ, "rms in nm", f"{name}: held out, rms by band", "xy")

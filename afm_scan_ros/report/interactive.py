@@ -1,0 +1,321 @@
+"""Pictures drawn by Bokeh for pages: they zoom, show values, and share axes and cursor."""
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from itertools import chain
+from math import isqrt
+from typing import Any, Literal
+
+import numpy as np
+from attrs import define, evolve, field, frozen
+from bokeh.embed import components
+from bokeh.events import Tap
+from bokeh.models import (
+    ColumnDataSource,
+    CrosshairTool,
+    CustomJS,
+    DataRange1d,
+    HoverTool,
+    LinearColorMapper,
+    Range1d,
+)
+from bokeh.models.annotations import ColorBar, Span
+from bokeh.palettes import Greys256, RdBu11, interp_palette
+from bokeh.plotting import figure
+from bokeh.resources import Resources
+from markupsafe import Markup
+
+from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.picture import (
+    DARK_GREY,
+    GREY,
+    Bars,
+    Curve,
+    Map,
+    Mark,
+    Panel,
+    PickedLine,
+    Picture,
+    Shade,
+    Steps,
+    Stretches,
+    thinned,
+)
+
+Plot = Any
+"""A figure of Bokeh, whose methods make their attributes at run time."""
+TOOLS = "box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
+MOST_PIXELS, FINEST = 180_000, 256
+"""Pixels of all images of a page together, and along a side of one, at most."""
+ROW = 200
+"""Height of a row of panels, pixels."""
+STRETCH: Any = {"fill_alpha": 0.3, "line_alpha": 0.0}
+
+PICK_LINE = """
+const values = image.data.image[0], [count, wide] = values.shape;
+const place = Math.floor(count * (line.location - bottom) / (top - bottom));
+const row = Math.max(0, Math.min(count - 1, place));
+source.data = {...source.data, y: values.slice(row * wide, (row + 1) * wide)};
+"""
+"""Shows the line of an image that is picked."""
+PICK_BAND = """
+const place = edges.findIndex(edge => edge > cb_obj.x);
+if (place > 0) { range.setv({start: edges[place - 1], end: edges[place]}); }
+"""
+"""Has the spectrum show the band that is picked."""
+
+
+@frozen(eq=False)
+class Drawn:
+    """Pictures as a page has them: the library, their data, and the place of each panel."""
+
+    library: Markup
+    data: Markup
+    panels: Mapping[str, Sequence[Sequence[Markup]]]
+
+
+def drawn(pictures: Sequence[Picture]) -> Drawn:
+    """Draw pictures, whose names differ."""
+    images = sum(len(panel.maps) for picture in pictures for panel in picture.panels)
+    finest = min(FINEST, isqrt(MOST_PIXELS // max(1, images)))
+    made = {picture.name: _Drawing(coarse(picture, finest)).rows() for picture in pictures}
+    plots = [plot for rows in made.values() for row in rows for plot in row]
+    data, places = components(plots)
+    place = iter(places)
+    panels = {
+        name: [[Markup(next(place)) for _ in row] for row in rows]  # noqa: S704 - of Bokeh
+        for name, rows in made.items()
+    }
+    library = Resources(mode="inline", components=["bokeh"]).render_js()
+    return Drawn(Markup(library), Markup(data), panels)  # noqa: S704 - of Bokeh, which escapes
+
+
+def coarse(picture: Picture, finest: int) -> Picture:
+    """Return a picture whose images have no more lines and pixels: each is the mean of some."""
+    seen: dict[int, Map] = {}
+
+    def reduced(of: Map) -> Map:
+        return seen.setdefault(id(of), evolve(of, values=block_means(of.values, finest)))
+
+    def drawn_by(mark: Mark) -> Mark:
+        if isinstance(mark, PickedLine):
+            return evolve(mark, of=reduced(mark.of))
+        return reduced(mark) if isinstance(mark, Map) else mark
+
+    rows = [
+        [evolve(panel, marks=[drawn_by(mark) for mark in panel.marks]) for panel in row]
+        for row in picture.rows
+    ]
+    return evolve(picture, rows=rows)
+
+
+def block_means(values: Array, finest: int) -> Array:
+    """Return the means of neighbouring lines and pixels, so few that none exceeds ``finest``."""
+    for axis, count in enumerate(values.shape):
+        starts = np.unique(np.linspace(0, count, min(count, finest) + 1).astype(int)[:-1])
+        sizes = np.diff(np.append(starts, count))
+        shape = (-1, 1) if axis == 0 else (1, -1)
+        values = np.add.reduceat(values, starts, axis=axis) / sizes.reshape(shape)
+    return values
+
+
+@define(eq=False)
+class _Drawing:
+    """A picture that is being drawn, and what its panels share."""
+
+    picture: Picture
+    ranges: dict[tuple[str, str], Any] = field(factory=dict)
+    images: dict[int, ColumnDataSource] = field(factory=dict)
+    cursor: Span = field(factory=lambda: Span(dimension="height", line_color=DARK_GREY))
+    line: Span = field(factory=lambda: Span(dimension="width", line_color=DARK_GREY))
+
+    def rows(self) -> list[list[Plot]]:
+        """Draw each panel."""
+        rows = [[self._plot(panel) for panel in row] for row in self.picture.rows]
+        self._add_variants(rows)
+        pairs = zip(self.picture.panels, chain.from_iterable(rows), strict=True)
+        plots = {panel.role: plot for panel, plot in pairs}
+        if "bands" in plots and "spectrum" in plots:
+            args = {"edges": self._edges(), "range": plots["spectrum"].x_range}
+            plots["bands"].js_on_event(Tap, CustomJS(args=args, code=PICK_BAND))
+        return rows
+
+    def _add_variants(self, rows: list[list[Plot]]) -> None:
+        """Give the page the data of each variant, under the number of what they replace."""
+        for name, other in self.picture.variants.items():
+            drawn = _Drawing(evolve(self.picture, rows=other, variants={})).rows()
+            for plot, unseen in zip(chain(*rows), chain(*drawn), strict=True):
+                sources = [renderer.data_source for renderer in unseen.renderers]
+                for number, source in enumerate(sources):
+                    source.name = f"{name}/{number}"
+                plot.tags = [*plot.tags, *sources]
+
+    def _edges(self) -> list[float]:
+        """Edges of the bands that can be picked."""
+        marks = (m for p in self.picture.panels if p.role == "bands" for m in p.marks)
+        return list(map(float, next(m for m in marks if isinstance(m, Steps)).edges))
+
+    def _plot(self, panel: Panel) -> Plot:
+        """Draw a panel."""
+        plot = figure(
+            x_axis_label=panel.x,
+            y_axis_label=panel.y,
+            x_axis_type="datetime" if panel.dates else _scale(panel, "x"),
+            y_axis_type=_scale(panel, "y"),
+            height=round(ROW * self.picture.height),
+            sizing_mode="stretch_width",
+            tools=TOOLS,
+            match_aspect=panel.equal,
+            **self._shared(panel),
+        )
+        plot.toolbar.update(logo=None, autohide=True)
+        if panel.level is not None:
+            plot.add_layout(Span(dimension="width", location=panel.level, line_color=GREY))
+        for mark in panel.marks:
+            self._add(mark, plot)
+        if panel.maps and self.picture.lines:
+            self._pick_line(plot, panel.maps[0])
+        self._tell(plot, panel)
+        return plot
+
+    def _add(self, mark: Mark, plot: Plot) -> None:
+        renderer = _draw(mark, plot)
+        if isinstance(mark, Map):
+            self.images[id(mark)] = renderer.data_source
+        if isinstance(mark, PickedLine):
+            of = mark.of
+            hidden = ColumnDataSource({"image": [_single(of.values)]})
+            args = {"line": self.line, "source": renderer.data_source, "bottom": of.bottom}
+            args |= {"image": self.images.setdefault(id(of), hidden), "top": of.top}
+            self.line.js_on_change("location", CustomJS(args=args, code=PICK_LINE))
+
+    def _shared(self, panel: Panel) -> dict[str, Any]:
+        """Ranges that another panel has made, or those that this one shares with others."""
+        found: dict[str, Any] = {}
+        for of in panel.maps:
+            y_range = Range1d(start=of.bottom, end=of.top, bounds="auto")
+            found["y_range"] = self.ranges.setdefault(("y", panel.y), y_range)
+            own: Any = Range1d(start=of.left, end=of.right, bounds="auto")
+        if not panel.maps:
+            own = DataRange1d(range_padding=0.0)
+        found["x_range"] = self.ranges.setdefault(("x", panel.x), own)
+        return found
+
+    def _pick_line(self, plot: Plot, of: Map) -> None:
+        """Have a tap on an image pick its line, as the page's own control does."""
+        self.line.update(name=f"line of {self.picture.name}", tags=[of.bottom, of.top])
+        self.line.location = 0.5 * (of.bottom + of.top)
+        plot.add_layout(self.line)
+        plot.js_on_event(Tap, CustomJS(args={"line": self.line}, code="line.location = cb_obj.y"))
+
+    def _tell(self, plot: Plot, panel: Panel) -> None:
+        """Show values beside the cursor, which all panels share."""
+        told = [renderer for renderer in plot.renderers if "tell" in renderer.tags]
+        if panel.maps:
+            tips = [(panel.x, "$x"), (panel.y, "$y"), (panel.maps[0].label, "@image")]
+            plot.add_tools(HoverTool(tooltips=tips))
+        elif told:
+            shown, form = ("%F %H:%M", "datetime") if panel.dates else ("%.6g", "printf")
+            tips = [("", "$name"), (panel.x, f"@x{{{shown}}}"), (panel.y, "@y{%.5g}")]
+            forms: Any = {"@x": form, "@y": "printf"}
+            plot.add_tools(HoverTool(renderers=told, mode="vline", tooltips=tips, formatters=forms))
+        unseen = Span(dimension="width", line_alpha=0.0)
+        plot.add_tools(CrosshairTool(overlay=(self.cursor, unseen)))
+
+
+def _scale(panel: Panel, axis: str) -> Literal["log", "linear"]:
+    return "log" if axis in panel.log else "linear"
+
+
+def _single(values: Any) -> Any:  # noqa: ANN401 - dates too
+    """Half as many bytes, of which no eye sees a difference; dates need all."""
+    values = np.asarray(values)
+    return values if values.dtype.kind == "M" else values.astype(np.float32)
+
+
+def _named(name: str) -> dict[str, str]:
+    return {"name": name} if name else {}
+
+
+@singledispatch
+def _draw(mark: object, plot: Plot) -> Plot:
+    raise TypeError(f"{type(mark).__name__} is no mark, for {plot}")
+
+
+@_draw.register
+def _(mark: Curve, plot: Plot) -> None:
+    shown = thinned(mark)
+    source = ColumnDataSource({"x": _single(shown.x), "y": _single(shown.y)})
+    made = {"color": mark.colour, "source": source, "tags": ["tell"], **_named(mark.name)}
+    if mark.dots:
+        plot.scatter("x", "y", size=4, **made)
+    else:
+        dash = "dashed" if mark.dashed else "solid"
+        plot.line("x", "y", line_width=mark.width, line_dash=dash, **made)
+
+
+@_draw.register
+def _(mark: Shade, plot: Plot) -> None:
+    source = ColumnDataSource(
+        {"x": _single(mark.x), "low": _single(mark.low), "high": _single(mark.high)}
+    )
+    named = _named(mark.name)
+    plot.varea("x", "low", "high", source=source, color=mark.colour, alpha=0.3, **named)
+
+
+@_draw.register
+def _(mark: Steps, plot: Plot) -> None:
+    values = np.append(mark.values, mark.values[-1])
+    source = ColumnDataSource({"x": _single(mark.edges), "y": _single(values)})
+    plot.step(
+        "x",
+        "y",
+        mode="after",
+        source=source,
+        color=mark.colour,
+        line_width=1.6,
+        line_dash="dashed" if mark.dashed else "solid",
+        tags=["tell"],
+        **_named(mark.name),
+    )
+
+
+@_draw.register
+def _(mark: Bars, plot: Plot) -> None:
+    columns = {"x": mark.x, "low": mark.low, "high": mark.high}
+    source = ColumnDataSource({name: _single(values) for name, values in columns.items()})
+    plot.segment(
+        "x", "low", "x", "high", source=source, color=mark.colour, line_width=mark.width,
+        **_named(mark.name),
+    )  # fmt: skip
+
+
+@_draw.register
+def _(mark: Stretches, plot: Plot) -> None:
+    starts, ends = np.reshape(np.array(mark.ends), (-1, 2)).T
+    source = ColumnDataSource({"x0": _single(starts), "x1": _single(ends)})
+    named = _named(mark.name)
+    plot.vstrip("x0", "x1", source=source, color=mark.colour, level="underlay", **STRETCH, **named)
+
+
+@_draw.register
+def _(mark: Map, plot: Plot) -> Plot:
+    palette = interp_palette(RdBu11, 255) if mark.signed else Greys256
+    colours = LinearColorMapper(palette=palette, low=mark.low, high=mark.high)
+    made = plot.image(
+        image=[_single(mark.values)],
+        x=mark.left,
+        y=mark.bottom,
+        dw=mark.right - mark.left,
+        dh=mark.top - mark.bottom,
+        color_mapper=colours,
+    )
+    plot.add_layout(ColorBar(color_mapper=colours, title=mark.label, width=10, padding=4), "right")
+    return made
+
+
+@_draw.register
+def _(mark: PickedLine, plot: Plot) -> Plot:
+    middle = np.asarray(mark.of.values)[len(mark.of.values) // 2]
+    source = ColumnDataSource({"x": _single(mark.of.across), "y": _single(middle)})
+    return plot.line("x", "y", source=source, color=mark.colour, tags=["tell"], **_named(mark.name))

@@ -1,0 +1,95 @@
+"""What a report says, in the order in which it is read: the answer, what to do next, evidence."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from attrs import frozen
+
+from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.report import html
+from afm_scan_ros.report.picture import Picture
+from afm_scan_ros.report.provenance import Provenance
+from afm_scan_ros.report.table import Rows
+
+
+@frozen
+class Link:
+    """A link to another page."""
+
+    text: str
+    target: str
+
+
+@frozen
+class CommandLine:
+    """A command line, and what it serves."""
+
+    purpose: str
+    line: str
+
+
+@frozen
+class Listing:
+    """A table of any length, which a page sorts, filters and shows in parts.
+
+    The first ``shown`` columns are those of the table; a row that is opened shows every one. A row
+    begins with the address of its own report, which may be empty.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str | float]]
+    shown: int
+
+
+Part: TypeAlias = str | Rows | Picture | Link | CommandLine | Listing
+
+
+@frozen
+class Section:
+    """A part of the evidence, folded until it is ``opened``."""
+
+    title: str
+    parts: Sequence[Part]
+    opened: bool = False
+
+
+@frozen
+class Report:
+    """A report: ``answer`` is two sentences, ``picture`` shows them, ``warnings`` limit them."""
+
+    title: str
+    answer: Sequence[str]
+    picture: Picture | None
+    next_steps: Sequence[str | CommandLine]
+    evidence: Sequence[Section]
+    warnings: Sequence[str] = ()
+    provenance: Provenance | None = None
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """Every picture, that of the answer first."""
+        return list(self._pictures())
+
+    def _pictures(self) -> Iterator[Picture]:
+        if self.picture is not None:
+            yield self.picture
+        for section in self.evidence:
+            yield from (part for part in section.parts if isinstance(part, Picture))
+
+    def page(self) -> str:
+        """Return the report as one HTML page that needs nothing else."""
+        from afm_scan_ros.report.interactive import drawn  # noqa: PLC0415 - a page alone needs it
+
+        return html.page("report.html", report=self, drawn=drawn(self.pictures))
+
+    def write(self, file: Path, figures: str | None) -> None:
+        """Write the page, and beside it each picture as a file of a format, if one is named."""
+        write_text(file, self.page())
+        if figures is None:
+            return
+        from afm_scan_ros.report.paper import paper_figure, save  # noqa: PLC0415 - by matplotlib
+
+        for picture in (each for of in self.pictures for each in of.singly()):
+            path = file.with_name(f"{file.stem}_{picture.name}.{figures}")
+            save(paper_figure(picture), path)

@@ -1,0 +1,172 @@
+"""Pictures of a whole scan, read block by block: each signal's peaks, and the error by line."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from math import ceil
+
+import numpy as np
+from attrs import define, field
+
+from afm_scan_ros.bag.reader import ScanRecording
+from afm_scan_ros.core.image_lines import Frame, ImageLine, LineImager, frame_of
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
+from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.report.analysis import scan_spec
+from afm_scan_ros.report.picture import (
+    BINS,
+    BLUE,
+    MICRO,
+    NANO,
+    ORANGE,
+    Curve,
+    Map,
+    Panel,
+    PickedLine,
+    Picture,
+    extremes,
+    thinned,
+)
+from afm_scan_ros.report.scan_pictures import DRIVE, LOW, topics_shown
+
+FINEST = 128
+"""Pixels and lines of the image of an error, at most."""
+TIME = "time in s"
+
+
+@define(eq=False)
+class _Signal:
+    """A signal of a scan, of which each block gives its extremes."""
+
+    period: float
+    share: float
+    times: list[Array] = field(factory=list)
+    values: list[Array] = field(factory=list)
+
+    def add(self, first: int, values: Array) -> None:
+        kept = extremes(values, ceil(self.share * values.size))
+        self.times.append(self.period * (first + kept.astype(np.float64)))
+        self.values.append(values[kept])
+
+    def curve(self, scale: float, name: str, colour: str) -> Curve:
+        time, values = np.concatenate(self.times), np.concatenate(self.values)
+        return thinned(Curve(time, scale * values, name, colour))
+
+
+Signals = dict[tuple[str, str], _Signal]
+"""Each by what it is and its axis."""
+
+
+def whole_pictures(recording: ScanRecording) -> Iterator[Picture]:
+    """Yield the course of errors and drive over the whole scan, and the error by line and place.
+
+    Keeps a block, a line and what is drawn in memory.
+    """
+    spec, topics = scan_spec(recording), topics_shown(recording)
+    share = BINS / max(1, recording.info.total_samples)
+    signals: Signals = defaultdict(lambda: _Signal(spec.sample_period, share))
+    imager = _imager(spec)
+    for desired, achieved, *drive in recording.blocks(*topics):
+        for axis in AXES:
+            error = achieved.axis(axis) - desired.axis(axis)
+            signals["error", axis].add(desired.first_sample, error)
+            if drive:
+                signals["drive", axis].add(desired.first_sample, drive[0].axis(axis))
+        if imager is not None:
+            imager.add(desired, achieved)
+    if signals:
+        yield _course(signals, driven=DRIVE in topics)
+    if imager is not None and imager.lines["x"]:
+        yield imager.picture()
+
+
+def _course(signals: Signals, *, driven: bool) -> Picture:
+    rows = [
+        [Panel([signals["error", a].curve(NANO, "", BLUE)], TIME, f"{a} error in nm", level=0.0)]
+        for a in AXES
+    ]
+    if driven:
+        drives = [
+            signals["drive", axis].curve(1.0, axis, colour)
+            for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)
+        ]
+        rows.append([Panel(drives, TIME, "drive in V")])
+    caption = (
+        "The whole scan, preparation and approach included. Of each stretch the lowest and the"
+        " highest sample are drawn, so that no peak is missing."
+    )
+    return Picture("whole", caption, rows, LOW)
+
+
+def _imager(spec: ScanSpec) -> "_ErrorImager | None":
+    """Return what images the error; None where the scan has no lines, or lines of few samples."""
+    pixels = min(FINEST, int(0.4 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1)
+    if spec.pattern not in TO_AND_FRO or pixels < 1:
+        return None
+    return _ErrorImager(spec, frame_of(spec, pixels))
+
+
+@define(eq=False)
+class _ErrorImager:
+    """Images the error of both axes at the desired positions, line by line."""
+
+    spec: ScanSpec
+    frame: Frame
+    lines: dict[str, list[ImageLine]] = field(factory=lambda: {axis: [] for axis in AXES})
+    _imagers: dict[str, LineImager] = field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        self._imagers = {axis: LineImager(self.spec, self.frame) for axis in AXES}
+
+    def add(self, desired: Trace, achieved: Trace) -> None:
+        """Take a block."""
+        where = phases(self.spec).lines
+        start, stop = max(where.start, desired.first_sample), min(where.stop, end(desired))
+        if start >= stop:
+            return
+        wanted, moved = (part(trace, start, stop) for trace in (desired, achieved))
+        for axis, imager in self._imagers.items():
+            error = NANO * (moved.axis(axis) - wanted.axis(axis))
+            self.lines[axis] += imager.add(wanted.x, error)
+
+    def picture(self) -> Picture:
+        """Show the x error on trace and retrace as images, and both axes' error of a line."""
+        ways = ("trace", "retrace")
+        maps = {(axis, way): self._map(axis, way) for axis in AXES for way in ways}
+        x, y = "desired x in µm", "lines"
+        images = [Panel([maps["x", way]], x, y, f"x error, {way}") for way in ways]
+        lines = [
+            Panel(
+                [
+                    PickedLine(maps[axis, way], way, colour)
+                    for way, colour in zip(ways, (BLUE, ORANGE), strict=True)
+                ],
+                x,
+                f"{axis} error in nm",
+                level=0.0,
+            )
+            for axis in AXES
+        ]
+        caption = "The error by line and place. Tap an image to see the errors of the line there."
+        if len(self.lines["x"]) > FINEST:
+            caption += " Neighbouring lines share a row, which shows the largest of their errors."
+        return Picture("by_line", caption, (images, lines))
+
+    def _map(self, axis: str, way: str) -> Map:
+        values = np.stack([getattr(line, way) for line in self.lines[axis]])
+        count = len(values)
+        each = ceil(count / FINEST)
+        groups = [values[start : start + each] for start in range(0, count, each)]
+        shown = np.stack([_largest(group) for group in groups])
+        most = float(np.nanmax(np.abs(shown), initial=np.finfo(float).tiny))
+        left, right = MICRO * self.frame.left, MICRO * self.frame.right
+        label = "error in nm"
+        return Map(shown, left, right, 0.0, float(count), label, -most, most, signed=True)
+
+
+def _largest(group: Array) -> Array:
+    """Return the value of largest magnitude of each column."""
+    row = np.argmax(np.nan_to_num(np.abs(group), nan=-1.0), axis=0)
+    result: Array = group[row, np.arange(group.shape[1])]
+    return result
