@@ -11,8 +11,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 workspace=${1:-$HOME/afm_scan_ws}
 ros=${ROS_SETUP:-/opt/ros/jazzy/setup.bash}
-from_pip=("mcap>=1.5,<2" "numba>=0.59.0,<1" "rosbags>=0.10,<0.12")
-pip_keys=(mcap-ros2-support python3-rosbags-pip)
+from_pip=("bokeh>=3.9.0,<4" "mcap>=1.5,<2" "numba>=0.59.0,<1" "rosbags>=0.10,<0.12")
+pip_keys=(python3-bokeh-pip mcap-ros2-support python3-rosbags-pip)
 
 if [ ! -f "$ros" ]; then
   echo "install_on_jazzy.sh: $ros is missing: install ROS 2 Jazzy first" >&2

@@ -25,6 +25,7 @@ EXECUTABLES = (ROOT / "resource/executables.txt").read_text("utf-8").splitlines(
 # as lz4 and zstandard come with mcap.
 ROSDEP = {
     "attrs": "python3-attrs",
+    "bokeh": "python3-bokeh-pip",
     "click": "python3-click",
     "jinja2": "python3-jinja2",
     "matplotlib": "python3-matplotlib",
@@ -88,6 +89,7 @@ def test_every_import_is_declared() -> None:
     extras = {"distributed", "nidaqmx", "pyarrow"}
     extras |= {"NSFopen", "gsffile", "gwyfile", "h5netcdf", "igor2", "pySPM"}
     declared = {*ROSDEP, *extras, "yaml", "afm_scan_ros", "lz4", "zstandard", "PIL"}  # matplotlib's
+    declared.add("markupsafe")  # jinja2's
     ros = {each.text for kind in ("depend", "exec_depend") for each in PACKAGE.iter(kind)}
     for path in (ROOT / "afm_scan_ros").rglob("*.py"):
         unknown = imported(path) - declared - ros - sys.stdlib_module_names

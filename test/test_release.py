@@ -18,7 +18,7 @@ from afm_scan_ros.files import version
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "scripts/install_on_jazzy.sh"
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of catkin_pkg itself
-PIP_KEYS = {"mcap-ros2-support", "python3-rosbags-pip"}
+PIP_KEYS = {"python3-bokeh-pip", "mcap-ros2-support", "python3-rosbags-pip"}
 """Keys of rosdep that stand for packages of pip, the only ones that the package has."""
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 PYTHON = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"]]
@@ -107,7 +107,7 @@ def test_the_scripts_are_sound() -> None:
 def test_the_script_names_what_there_is() -> None:
     text = SCRIPT.read_text("utf-8")
     assert set(words(text, "pip_keys=(", ")")) == PIP_KEYS <= needed("jazzy")
-    without_package = {"mcap", "numba", "rosbags"}
+    without_package = {"bokeh", "mcap", "numba", "rosbags"}
     asked = {each for each in PYTHON if each.split(">=")[0] in without_package}
     assert {each.strip('"') for each in words(text, "from_pip=(", ")")} == asked
     assert set(words(text, "--packages-select ", "\n")) == {manifest("jazzy").name}

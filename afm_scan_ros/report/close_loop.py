@@ -9,6 +9,7 @@ from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.diagnosis_text import (
     HELD_OUT,
+    brief,
     effects,
     limits_text,
     next_steps,
@@ -166,7 +167,7 @@ def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = ""
     shown = next((number for number, done in compared if done is last), None)
     return Report(
         title="Closed loop: scan, diagnose, extend, scan again",
-        answer=[*verdict_text(found), " ".join(final_text(rounds, failure))],
+        answer=[*brief(found), " ".join(final_text(rounds, failure))],
         picture=_lines(last, shown) if shown else None,
         next_steps=list(next_steps(found)),
         evidence=[

@@ -27,6 +27,7 @@ from afm_scan_ros.report.diagnosis_text import (
     TRIED,
     VERDICTS,
     alternative_rows,
+    brief,
     evidence_text,
     form_text,
     next_steps,
@@ -34,7 +35,6 @@ from afm_scan_ros.report.diagnosis_text import (
     probability_text,
     result,
     share_text,
-    verdict_text,
     why_not_text,
 )
 from afm_scan_ros.report.page import Report, Section
@@ -80,7 +80,7 @@ def diagnosis_report(found: ResidualReport, of: Provenance) -> Report:
     ]
     return Report(
         title="Diagnosis of a scanner's residual",
-        answer=[*verdict_text(diagnosis), *_change(diagnosis)],
+        answer=[*brief(diagnosis), *_change(diagnosis)],
         picture=drawn[first][0],
         next_steps=list(next_steps(diagnosis)),
         evidence=[

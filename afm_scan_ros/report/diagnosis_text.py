@@ -98,6 +98,15 @@ def result(found: ScannerDiagnosis) -> Iterator[Part]:
     yield from limits_text(found)
 
 
+def brief(found: ScannerDiagnosis) -> Iterator[str]:
+    """Yield what the model lacks in a sentence where effects are found, or else the verdicts."""
+    named = [f"{effect.name.replace('_', ' ')} in {effect.axis}" for effect in found.effects]
+    if found.verdict == FOUND and named:
+        yield f"The model lacks {' and '.join(named)}, with a probability of 95 % or more."
+    else:
+        yield from verdict_text(found)
+
+
 def effects(found: ScannerDiagnosis) -> Iterator[Rows]:
     """Yield a table of the effects, a row for each parameter; nothing where none is found."""
     if found.effects:

@@ -49,7 +49,8 @@ MOST_PIXELS, FINEST = 180_000, 256
 """Pixels of all images of a page together, and along a side of one, at most."""
 ROW = 200
 """Height of a row of panels, pixels."""
-STRETCH: Any = {"fill_alpha": 0.3, "line_alpha": 0.0}
+TOLD = "told"
+"""Tag of what shows its values beside the cursor."""
 
 PICK_LINE = """
 const values = image.data.image[0], [count, wide] = values.shape;
@@ -143,9 +144,8 @@ class _Drawing:
     def _add_variants(self, rows: list[list[Plot]]) -> None:
         """Give the page the data of each variant, under the number of what they replace."""
         for name, other in self.picture.variants.items():
-            drawn = _Drawing(evolve(self.picture, rows=other, variants={})).rows()
-            for plot, unseen in zip(chain(*rows), chain(*drawn), strict=True):
-                sources = [renderer.data_source for renderer in unseen.renderers]
+            for plot, panel in zip(chain(*rows), chain(*other), strict=True):
+                sources = [_source(mark) for mark in panel.marks]
                 for number, source in enumerate(sources):
                     source.name = f"{name}/{number}"
                 plot.tags = [*plot.tags, *sources]
@@ -158,7 +158,7 @@ class _Drawing:
     def _plot(self, panel: Panel) -> Plot:
         """Draw a panel."""
         plot = figure(
-            x_axis_label=panel.x,
+            x_axis_label=None if panel.dates else panel.x,
             y_axis_label=panel.y,
             x_axis_type="datetime" if panel.dates else _scale(panel, "x"),
             y_axis_type=_scale(panel, "y"),
@@ -166,6 +166,7 @@ class _Drawing:
             sizing_mode="stretch_width",
             tools=TOOLS,
             match_aspect=panel.equal,
+            min_border_left=64,
             **self._shared(panel),
         )
         plot.toolbar.update(logo=None, autohide=True)
@@ -179,27 +180,28 @@ class _Drawing:
         return plot
 
     def _add(self, mark: Mark, plot: Plot) -> None:
-        renderer = _draw(mark, plot)
+        source = _source(mark)
+        _draw(mark, plot, source)
         if isinstance(mark, Map):
-            self.images[id(mark)] = renderer.data_source
+            self.images[id(mark)] = source
         if isinstance(mark, PickedLine):
             of = mark.of
-            hidden = ColumnDataSource({"image": [_single(of.values)]})
-            args = {"line": self.line, "source": renderer.data_source, "bottom": of.bottom}
-            args |= {"image": self.images.setdefault(id(of), hidden), "top": of.top}
+            if id(of) not in self.images:
+                self.images[id(of)] = _source(of)
+            ends: dict[str, Any] = {"bottom": of.bottom, "top": of.top}
+            args = {"line": self.line, "source": source, "image": self.images[id(of)], **ends}
             self.line.js_on_change("location", CustomJS(args=args, code=PICK_LINE))
 
     def _shared(self, panel: Panel) -> dict[str, Any]:
         """Ranges that another panel has made, or those that this one shares with others."""
-        found: dict[str, Any] = {}
+        own: dict[str, Any] = {"x_range": DataRange1d(range_padding=0.0)}
         for of in panel.maps:
-            y_range = Range1d(start=of.bottom, end=of.top, bounds="auto")
-            found["y_range"] = self.ranges.setdefault(("y", panel.y), y_range)
-            own: Any = Range1d(start=of.left, end=of.right, bounds="auto")
-        if not panel.maps:
-            own = DataRange1d(range_padding=0.0)
-        found["x_range"] = self.ranges.setdefault(("x", panel.x), own)
-        return found
+            own["x_range"] = Range1d(start=of.left, end=of.right, bounds="auto")
+            own["y_range"] = Range1d(start=of.bottom, end=of.top, bounds="auto")
+        labels = {"x_range": panel.x, "y_range": panel.y}
+        return {
+            name: self.ranges.setdefault((name, labels[name]), made) for name, made in own.items()
+        }
 
     def _pick_line(self, plot: Plot, of: Map) -> None:
         """Have a tap on an image pick its line, as the page's own control does."""
@@ -210,7 +212,7 @@ class _Drawing:
 
     def _tell(self, plot: Plot, panel: Panel) -> None:
         """Show values beside the cursor, which all panels share."""
-        told = [renderer for renderer in plot.renderers if "tell" in renderer.tags]
+        told = [renderer for renderer in plot.renderers if TOLD in renderer.tags]
         if panel.maps:
             tips = [(panel.x, "$x"), (panel.y, "$y"), (panel.maps[0].label, "@image")]
             plot.add_tools(HoverTool(tooltips=tips))
@@ -233,89 +235,102 @@ def _single(values: Any) -> Any:  # noqa: ANN401 - dates too
     return values if values.dtype.kind == "M" else values.astype(np.float32)
 
 
-def _named(name: str) -> dict[str, str]:
-    return {"name": name} if name else {}
+@singledispatch
+def _columns(mark: Any) -> dict[str, Any]:  # noqa: ANN401 - of whatever kind is registered
+    """Return what is drawn of a mark, by the names that ``_draw`` has for it."""
+    return {"x": mark.x, "low": mark.low, "high": mark.high}
+
+
+@_columns.register
+def _(mark: Curve) -> dict[str, Any]:
+    shown = thinned(mark)
+    return {"x": shown.x, "y": shown.y}
+
+
+@_columns.register
+def _(mark: Steps) -> dict[str, Any]:
+    return {"x": mark.edges, "y": np.append(mark.values, mark.values[-1])}
+
+
+@_columns.register
+def _(mark: Stretches) -> dict[str, Any]:
+    starts, ends = np.reshape(np.array(mark.ends), (-1, 2)).T
+    return {"x0": starts, "x1": ends}
+
+
+@_columns.register
+def _(mark: Map) -> dict[str, Any]:
+    return {"image": [mark.values]}
+
+
+@_columns.register
+def _(mark: PickedLine) -> dict[str, Any]:
+    return {"x": mark.of.across, "y": mark.of.values[len(mark.of.values) // 2]}
+
+
+def _source(mark: Mark) -> ColumnDataSource:
+    columns = _columns(mark)
+    return ColumnDataSource(
+        {
+            name: [_single(v) for v in values] if isinstance(values, list) else _single(values)
+            for name, values in columns.items()
+        }
+    )
+
+
+def _style(mark: Any, source: ColumnDataSource, **more: object) -> dict[str, Any]:  # noqa: ANN401 - any but Map
+    named = {"name": mark.name} if mark.name else {}
+    return {"source": source, "color": mark.colour, **named, **more}
 
 
 @singledispatch
-def _draw(mark: object, plot: Plot) -> Plot:
-    raise TypeError(f"{type(mark).__name__} is no mark, for {plot}")
+def _draw(mark: Any, plot: Plot, source: ColumnDataSource) -> None:  # noqa: ANN401 - as above
+    raise TypeError(f"{type(mark).__name__} is no mark, for {plot} and {source}")
 
 
 @_draw.register
-def _(mark: Curve, plot: Plot) -> None:
-    shown = thinned(mark)
-    source = ColumnDataSource({"x": _single(shown.x), "y": _single(shown.y)})
-    made = {"color": mark.colour, "source": source, "tags": ["tell"], **_named(mark.name)}
+def _(mark: Curve, plot: Plot, source: ColumnDataSource) -> None:
     if mark.dots:
-        plot.scatter("x", "y", size=4, **made)
+        plot.scatter("x", "y", size=4, **_style(mark, source, tags=[TOLD]))
     else:
         dash = "dashed" if mark.dashed else "solid"
-        plot.line("x", "y", line_width=mark.width, line_dash=dash, **made)
+        style = _style(mark, source, tags=[TOLD], line_width=mark.width, line_dash=dash)
+        plot.line("x", "y", **style)
 
 
 @_draw.register
-def _(mark: Shade, plot: Plot) -> None:
-    source = ColumnDataSource(
-        {"x": _single(mark.x), "low": _single(mark.low), "high": _single(mark.high)}
-    )
-    named = _named(mark.name)
-    plot.varea("x", "low", "high", source=source, color=mark.colour, alpha=0.3, **named)
+def _(mark: Shade, plot: Plot, source: ColumnDataSource) -> None:
+    plot.varea("x", "low", "high", **_style(mark, source, alpha=0.3))
 
 
 @_draw.register
-def _(mark: Steps, plot: Plot) -> None:
-    values = np.append(mark.values, mark.values[-1])
-    source = ColumnDataSource({"x": _single(mark.edges), "y": _single(values)})
-    plot.step(
-        "x",
-        "y",
-        mode="after",
-        source=source,
-        color=mark.colour,
-        line_width=1.6,
-        line_dash="dashed" if mark.dashed else "solid",
-        tags=["tell"],
-        **_named(mark.name),
-    )
+def _(mark: Steps, plot: Plot, source: ColumnDataSource) -> None:
+    dash = "dashed" if mark.dashed else "solid"
+    style = _style(mark, source, tags=[TOLD], line_width=1.6, line_dash=dash)
+    plot.step("x", "y", mode="after", **style)
 
 
 @_draw.register
-def _(mark: Bars, plot: Plot) -> None:
-    columns = {"x": mark.x, "low": mark.low, "high": mark.high}
-    source = ColumnDataSource({name: _single(values) for name, values in columns.items()})
-    plot.segment(
-        "x", "low", "x", "high", source=source, color=mark.colour, line_width=mark.width,
-        **_named(mark.name),
-    )  # fmt: skip
+def _(mark: Bars, plot: Plot, source: ColumnDataSource) -> None:
+    plot.segment("x", "low", "x", "high", **_style(mark, source, line_width=mark.width))
 
 
 @_draw.register
-def _(mark: Stretches, plot: Plot) -> None:
-    starts, ends = np.reshape(np.array(mark.ends), (-1, 2)).T
-    source = ColumnDataSource({"x0": _single(starts), "x1": _single(ends)})
-    named = _named(mark.name)
-    plot.vstrip("x0", "x1", source=source, color=mark.colour, level="underlay", **STRETCH, **named)
+def _(mark: Stretches, plot: Plot, source: ColumnDataSource) -> None:
+    style = _style(mark, source, level="underlay", fill_alpha=0.3, line_alpha=0.0)
+    plot.vstrip("x0", "x1", **style)
 
 
 @_draw.register
-def _(mark: Map, plot: Plot) -> Plot:
+def _(mark: Map, plot: Plot, source: ColumnDataSource) -> None:
     palette = interp_palette(RdBu11, 255) if mark.signed else Greys256
     colours = LinearColorMapper(palette=palette, low=mark.low, high=mark.high)
-    made = plot.image(
-        image=[_single(mark.values)],
-        x=mark.left,
-        y=mark.bottom,
-        dw=mark.right - mark.left,
-        dh=mark.top - mark.bottom,
-        color_mapper=colours,
-    )
+    size = {"dw": mark.right - mark.left, "dh": mark.top - mark.bottom}
+    corner = {"x": mark.left, "y": mark.bottom}
+    plot.image("image", source=source, color_mapper=colours, **corner, **size)
     plot.add_layout(ColorBar(color_mapper=colours, title=mark.label, width=10, padding=4), "right")
-    return made
 
 
 @_draw.register
-def _(mark: PickedLine, plot: Plot) -> Plot:
-    middle = np.asarray(mark.of.values)[len(mark.of.values) // 2]
-    source = ColumnDataSource({"x": _single(mark.of.across), "y": _single(middle)})
-    return plot.line("x", "y", source=source, color=mark.colour, tags=["tell"], **_named(mark.name))
+def _(mark: PickedLine, plot: Plot, source: ColumnDataSource) -> None:
+    plot.line("x", "y", **_style(mark, source, tags=[TOLD], line_width=1.3))
