@@ -89,7 +89,7 @@ def demo(out: Path, figures: str | None) -> None:
     }
     made = demo_report(tables, compared, (IMAGED[0], _images(out)), next_commands(out), ran)
     made.write(out / "report.html", figures)
-    click.echo(f"Report: {out / 'report.html'}. Bags and JSON are in the same folder.")
+    click.echo(f"ReportPage: {out / 'report.html'}. Bags and JSON are in the same folder.")
 
 
 def next_commands(out: Path) -> Iterator[CommandLine]:

@@ -16,7 +16,7 @@ from afm_scan_ros.report.diagnosis_text import (
     residuals,
     verdict_text,
 )
-from afm_scan_ros.report.page import Link, Report, Section
+from afm_scan_ros.report.page import PageLink, ReportPage, Section
 from afm_scan_ros.report.page import Part as PagePart
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance
@@ -159,13 +159,13 @@ UNSEEN = (
 )
 
 
-def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = "") -> Report:
+def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = "") -> ReportPage:
     """Return the report on the rounds; ``failure`` ended the next one, if any."""
     last = reported(rounds)
     found = last.diagnosis
     compared = [(number, done) for number, done in enumerate(rounds, 1) if done.comparisons]
     shown = next((number for number, done in compared if done is last), None)
-    return Report(
+    return ReportPage(
         title="Closed loop: scan, diagnose, extend, scan again",
         answer=[*brief(found), " ".join(final_text(rounds, failure))],
         picture=_lines(last, shown) if shown else None,
@@ -182,7 +182,7 @@ def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = ""
 def _round(number: int, done: Round, *, first: bool) -> Section:
     """Return what a round found; its lines are elsewhere where it is shown ``first``."""
     parts: list[PagePart] = list(round_result(done))
-    parts.append(Link(f"Diagnosis of round {number}", f"round_{number}/report.html"))
+    parts.append(PageLink(f"Diagnosis of round {number}", f"round_{number}/report.html"))
     if done.comparisons:
         parts += [Rows(RESIDUAL, trial_residual_rows(done)), UNSEEN]
         parts += [] if first else [_lines(done, number)]

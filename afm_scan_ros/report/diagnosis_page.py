@@ -37,7 +37,7 @@ from afm_scan_ros.report.diagnosis_text import (
     share_text,
     why_not_text,
 )
-from afm_scan_ros.report.page import Report, Section
+from afm_scan_ros.report.page import ReportPage, Section
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
@@ -66,7 +66,7 @@ METHOD = (
 RECORDS = ("record", "samples", "sample period", "x at the start", "y at the start")
 
 
-def diagnosis_report(found: ResidualReport, of: Provenance) -> Report:
+def diagnosis_report(found: ResidualReport, of: Provenance) -> ReportPage:
     """Return the report on a diagnosis, with the pictures of the axes."""
     diagnosis = found.diagnosis
     drawn = {axis: _pictures(found, each) for axis, each in diagnosis.by_axis.items()}
@@ -78,7 +78,7 @@ def diagnosis_report(found: ResidualReport, of: Provenance) -> Report:
         )
         for axis, pictures in drawn.items()
     ]
-    return Report(
+    return ReportPage(
         title="Diagnosis of a scanner's residual",
         answer=[*brief(diagnosis), *_change(diagnosis)],
         picture=drawn[first][0],
@@ -222,10 +222,10 @@ COUPLED_METHOD = (
 )
 
 
-def coupled_report(found: CoupledDiagnosis, of: Provenance) -> Report:
+def coupled_report(found: CoupledDiagnosis, of: Provenance) -> ReportPage:
     """Return the report on a diagnosis of coupled axes, which has no picture."""
     verdict, *rest = coupled_result(found)
-    return Report(
+    return ReportPage(
         title="Diagnosis of coupled axes",
         answer=[str(verdict), *_change(found)],
         picture=None,

@@ -9,7 +9,7 @@ from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.fit_pictures import fit_picture, response_picture, slow_picture
 from afm_scan_ros.report.fit_summary import finding_text
-from afm_scan_ros.report.page import CommandLine, Part, Report, Section
+from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import MILLI, NANO
 from afm_scan_ros.report.table import Rows
 
@@ -28,7 +28,7 @@ METHOD = (
 )
 
 
-def fit_report(found: Identification, model: str) -> Report:
+def fit_report(found: Identification, model: str) -> ReportPage:
     """Return the fit report; ``model`` is the name of the model's file."""
     warned = [(name, one) for name, axis in found.axes.items() for one in axis.warnings]
     known = [
@@ -36,7 +36,7 @@ def fit_report(found: Identification, model: str) -> Report:
         for axis in found.model.axes
         for effect, status in found.model.axis(axis).effects.each()
     ]
-    return Report(
+    return ReportPage(
         title="Identification of a scanner",
         answer=list(_answer(found)),
         picture=fit_picture(found),

@@ -26,6 +26,7 @@ from bokeh.resources import Resources
 from markupsafe import Markup
 
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.drawing_settings import DRAWING
 from afm_scan_ros.report.picture import (
     DARK_GREY,
     GREY,
@@ -45,10 +46,6 @@ from afm_scan_ros.report.picture import (
 Plot = Any
 """A figure of Bokeh, whose methods make their attributes at run time."""
 TOOLS = "box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
-MOST_PIXELS, FINEST = 180_000, 256
-"""Pixels of all images of a page together, and along a side of one, at most."""
-ROW = 200
-"""Height of a row of panels, pixels."""
 TOLD = "told"
 """Tag of what shows its values beside the cursor."""
 
@@ -78,7 +75,7 @@ class Drawn:
 def drawn(pictures: Sequence[Picture]) -> Drawn:
     """Draw pictures, whose names differ."""
     images = sum(len(panel.maps) for picture in pictures for panel in picture.panels)
-    finest = min(FINEST, isqrt(MOST_PIXELS // max(1, images)))
+    finest = min(DRAWING.side, isqrt(DRAWING.pixels // max(1, images)))
     made = {picture.name: _Drawing(coarse(picture, finest)).rows() for picture in pictures}
     plots = [plot for rows in made.values() for row in rows for plot in row]
     data, places = components(plots)
@@ -162,7 +159,7 @@ class _Drawing:
             y_axis_label=panel.y,
             x_axis_type="datetime" if panel.dates else _scale(panel, "x"),
             y_axis_type=_scale(panel, "y"),
-            height=round(ROW * self.picture.height),
+            height=round(DRAWING.row * self.picture.height),
             sizing_mode="stretch_width",
             tools=TOOLS,
             match_aspect=panel.equal,

@@ -14,7 +14,7 @@ from afm_scan_ros.report.table import Rows
 
 
 @frozen
-class Link:
+class PageLink:
     """A link to another page."""
 
     text: str
@@ -42,7 +42,7 @@ class Listing:
     shown: int
 
 
-Part: TypeAlias = str | Rows | Picture | Link | CommandLine | Listing
+Part: TypeAlias = str | Rows | Picture | PageLink | CommandLine | Listing
 
 
 @frozen
@@ -55,7 +55,7 @@ class Section:
 
 
 @frozen
-class Report:
+class ReportPage:
     """A report: ``answer`` is two sentences, ``picture`` shows them, ``warnings`` limit them."""
 
     title: str

@@ -11,6 +11,7 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.drawing_settings import DRAWING
 
 Places: TypeAlias = Array | NDArray[np.datetime64]
 """Where marks lie on the axis of x; times are dates."""
@@ -21,9 +22,6 @@ GREY, DARK_GREY = "#b4bcc8", "#7a8494"
 BLUE, LIGHT_BLUE = "#2477c9", "#86b6de"
 ORANGE, LIGHT_ORANGE = "#d1541c", "#eaa987"
 """Colours that are read on white and on a dark page."""
-
-BINS = 3000
-"""Stretches of which a long curve keeps the ends."""
 
 
 @frozen(eq=False)
@@ -203,7 +201,7 @@ def extremes(y: Array, bins: int) -> NDArray[np.intp]:
     return found
 
 
-def thinned(curve: Curve, bins: int = BINS) -> Curve:
+def thinned(curve: Curve, bins: int = DRAWING.stretches) -> Curve:
     """Return a curve with no more points than are seen: each peak stays."""
     kept = extremes(curve.y, bins)
     return evolve(curve, x=curve.x[kept], y=curve.y[kept])

@@ -10,7 +10,7 @@ from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report.analysis import Analysis
-from afm_scan_ros.report.page import CommandLine, Part, Report, Section
+from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import Images, image_picture, tracking_picture, view_of
@@ -24,9 +24,9 @@ METHOD = (
 )
 
 
-def scan_report(analysis: Analysis, recording: ScanRecording) -> Report:
+def scan_report(analysis: Analysis, recording: ScanRecording) -> ReportPage:
     """Return the report on a recorded scan."""
-    return Report(
+    return ReportPage(
         title=f"Scan {analysis.scan.scan_id}",
         answer=list(_answer(analysis)),
         picture=tracking_picture(view_of(recording)),
@@ -223,7 +223,7 @@ def demo_report(
     imaged: tuple[DemoScan, Images],
     commands: Iterable[CommandLine],
     ran: str,
-) -> Report:
+) -> ReportPage:
     """Return the report on the demonstration; ``ran`` says how the scans ran."""
     scan, images = imaged
     without, compensated = (nanometres(error) for error in images.errors)
@@ -236,7 +236,7 @@ def demo_report(
         f"The image of a grating is wrong by {without} nm rms without compensation, and by"
         f" {compensated} nm with it."
     )
-    return Report(
+    return ReportPage(
         title="A piezoscanner without and with compensation",
         answer=[_improvement(tables[0]), wrong],
         picture=image_picture("grating", images, caption),

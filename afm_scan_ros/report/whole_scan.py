@@ -14,8 +14,8 @@ from afm_scan_ros.core.streams import end, part
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.analysis import scan_spec
+from afm_scan_ros.report.drawing_settings import DRAWING
 from afm_scan_ros.report.picture import (
-    BINS,
     BLUE,
     MICRO,
     NANO,
@@ -30,8 +30,6 @@ from afm_scan_ros.report.picture import (
 )
 from afm_scan_ros.report.scan_pictures import DRIVE, LOW, topics_shown
 
-FINEST = 128
-"""Pixels and lines of the image of an error, at most."""
 TIME = "time in s"
 
 
@@ -64,7 +62,7 @@ def whole_pictures(recording: ScanRecording) -> Iterator[Picture]:
     Keeps a block, a line and what is drawn in memory.
     """
     spec, topics = scan_spec(recording), topics_shown(recording)
-    share = BINS / max(1, recording.info.total_samples)
+    share = DRAWING.stretches / max(1, recording.info.total_samples)
     signals: Signals = defaultdict(lambda: _Signal(spec.sample_period, share))
     imager = _imager(spec)
     for desired, achieved, *drive in recording.blocks(*topics):
@@ -101,7 +99,9 @@ def _course(signals: Signals, *, driven: bool) -> Picture:
 
 def _imager(spec: ScanSpec) -> "_ErrorImager | None":
     """Return what images the error; None where the scan has no lines, or lines of few samples."""
-    pixels = min(FINEST, int(0.4 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1)
+    pixels = min(
+        DRAWING.error_side, int(0.4 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
+    )
     if spec.pattern not in TO_AND_FRO or pixels < 1:
         return None
     return _ErrorImager(spec, frame_of(spec, pixels))
@@ -149,14 +149,14 @@ class _ErrorImager:
             for axis in AXES
         ]
         caption = "The error by line and place. Tap an image to see the errors of the line there."
-        if len(self.lines["x"]) > FINEST:
+        if len(self.lines["x"]) > DRAWING.error_side:
             caption += " Neighbouring lines share a row, which shows the largest of their errors."
         return Picture("by_line", caption, (images, lines))
 
     def _map(self, axis: str, way: str) -> Map:
         values = np.stack([getattr(line, way) for line in self.lines[axis]])
         count = len(values)
-        each = ceil(count / FINEST)
+        each = ceil(count / DRAWING.error_side)
         groups = [values[start : start + each] for start in range(0, count, each)]
         shown = np.stack([_largest(group) for group in groups])
         most = float(np.nanmax(np.abs(shown), initial=np.finfo(float).tiny))

@@ -115,17 +115,17 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     table = grating_table(used, found.positions, found.figures, found.drift, found.refused)
     table.show()
     effects = found.model.effects["x"]
-    sentences = list(_known(effects, "µm commanded" if scale is None else "V"))
-    sentences += [*left_out(used, found.positions), *not_separated(used, effects)]
-    sentences += [f"Not used: {reason}." for reason in found.refused]
-    for sentence in sentences:
+    known = list(_known(effects, "µm commanded" if scale is None else "V"))
+    known += left_out(used, found.positions)
+    advice = [*not_separated(used, effects), *(f"Not used: {each}." for each in found.refused)]
+    for sentence in (*known, *advice):
         say(sentence)
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
     held = f"x with what is identified above, and y as a gain{coupled}"
     say(f"{out} holds the model: {held}.")
     if report is not None:
         deviation = deviation_picture(used, found.positions)
-        made = grating_report(table, used, found.corrected, deviation, sentences, out)
+        made = grating_report(table, used, found.corrected, deviation, known, advice)
         made.write(report, figures)
     if folder is not None:
         table.save(folder)

@@ -13,7 +13,7 @@ from afm_scan_ros.features.images.grating.motion import middles
 from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
 from afm_scan_ros.features.images.grating.rough_motion import FINEST
 from afm_scan_ros.features.images.scan_image import ScanImage
-from afm_scan_ros.report.page import CommandLine, Report, Section
+from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.paper import paper_figure
 from afm_scan_ros.report.picture import (
     BLUE,
@@ -141,7 +141,7 @@ def deviation_picture(images: Sequence[ScanImage], positions: Sequence[Positions
                     (each.retrace[..., number].mean(axis=number), ORANGE, 0.8, "retrace"),
                 )
             ]
-            label = f"actual minus commanded {axis} in µm"
+            label = f"deviation of {axis} in µm"
             title = f"{name}: {axis}, mean over the {MEANS[axis]}"
             row.append(Panel(curves, f"commanded {axis} in µm", label, title, level=0.0))
         rows.append(row)
@@ -201,27 +201,28 @@ def grating_report(
     images: Sequence[ScanImage],
     corrected: Sequence[ScanImage | None],
     deviation: Picture,
-    sentences: Sequence[str],
-    model: Path,
-) -> Report:
+    known: Sequence[str],
+    advice: Sequence[str],
+) -> ReportPage:
     """Return the report on a scanner identified from ``images``.
 
-    ``sentences`` say what the ``model`` holds, and what the images cannot tell.
+    ``known`` says what the model holds, ``advice`` what the images cannot tell, and which can.
     """
     pairs = [(a, b) for a, b in zip(images, corrected, strict=True) if b is not None]
     pictures = [*(correction_picture(a, b) for a, b in pairs), deviation]
-    return Report(
+    return ReportPage(
         title="A scanner identified from images of a grating",
-        answer=[*_answers(pairs), f"{model} holds the model, by which other images are corrected."],
+        answer=[*_answers(pairs), "The model corrects other images of this scanner too."],
         picture=pictures[0],
         next_steps=[
-            *sentences,
+            *advice,
             CommandLine(
                 "Correct another image of this scanner.",
                 "afm-scan grating IMAGE --pitch PITCH --out MODEL --correct OTHER --images FOLDER",
             ),
         ],
         evidence=[
+            Section("What the model holds", known),
             Section("Figures of each image, with 95 % intervals", [table.text()]),
             Section("Other images, and the deviation of the positions", pictures[1:]),
         ],

@@ -14,7 +14,7 @@ from afm_scan_ros.core.types import AXES
 from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.page import CommandLine, Report, Section
+from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.picture import BLUE, NANO, ORANGE, Curve, Panel, Picture
 from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
@@ -144,7 +144,7 @@ METHOD = (
 
 def learning_report(
     scans: Sequence[LearningScan], taught: Taught | None, of: Provenance, failure: str = ""
-) -> Report:
+) -> ReportPage:
     """Return the report on the scans; ``failure`` ended them, if any."""
     best = best_of(list(scans))
     table, *sentences = learning_text(scans)
@@ -155,7 +155,7 @@ def learning_report(
         sections.append(Section("What was learned, by frequency", [spectrum_picture(best)]))
     if taught is not None:
         sections.append(Section("What the model lacks", list(taught_text(taught))))
-    return Report(
+    return ReportPage(
         title="A scan learned from its errors",
         answer=list(_answer(scans, best)),
         picture=error_picture("lines", _two(scans[0], best), kind),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
 from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
-from afm_scan_ros.report.page import CommandLine, Listing, Report, Section
+from afm_scan_ros.report.page import CommandLine, Listing, ReportPage, Section
 from afm_scan_ros.report.picture import (
     BLUE,
     LIGHT_BLUE,
@@ -25,6 +25,7 @@ from afm_scan_ros.report.picture import (
 )
 from afm_scan_ros.report.provenance import UNSTATED
 from afm_scan_ros.report.quantity import nanometres, quantity, significant
+from afm_scan_ros.report.scan_pictures import LOW
 from afm_scan_ros.report.table import Part, Rows
 
 NANO = 1e-9
@@ -35,10 +36,6 @@ QUANTITIES = {
     "creep": "creep of {}",
     "residual_ratio": "residual of {} over its detection limit",
 }
-LOW = 0.6
-"""Height of a row, as there are many."""
-MOST_ADVISED = 3
-"""Instruments that changed for which a command is given."""
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 
 
@@ -103,11 +100,11 @@ LISTED = (
     "recording", "instrument", "time", "verdict", "effects", "residual over limit",
     "residual, nm", "detection limit, nm", "parameters of the effects", "samples", "bag",
 )  # fmt: skip
-SHOWN = 6
+SHOWN = LISTED.index("residual, nm")
 """Columns of the table of recordings; the others are seen in a row that is opened."""
 
 
-def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> Report:
+def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> ReportPage:
     """Return the report; ``reports`` are the addresses of those of single bags."""
     recordings = found.recordings
     versions = sorted({each.version for each in recordings})
@@ -115,7 +112,7 @@ def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> R
     changes = [Rows(CHANGES, [_change_row(each) for each in found.changes])]
     listing = Listing(LISTED, [_listed(each, reports) for each in recordings], SHOWN)
     instruments = [_instrument_row(n, some, found) for n, some in by_instrument(recordings)]
-    return Report(
+    return ReportPage(
         title="Survey of recordings",
         answer=list(_answer(found)),
         picture=_trends(found),
@@ -149,7 +146,7 @@ def _answer(found: Survey) -> Iterator[str]:
 
 
 def _next(found: Survey) -> Iterator[CommandLine]:
-    for name, some in list(found.changed.items())[:MOST_ADVISED]:
+    for name, some in list(found.changed.items())[:1]:
         after = [
             r for r in found.recordings if r.instrument == name and r.recorded >= some[0].before
         ]
