@@ -124,7 +124,7 @@ class _Drawing:
     picture: Picture
     ranges: dict[tuple[str, str], Any] = field(factory=dict)
     images: dict[int, ColumnDataSource] = field(factory=dict)
-    cursor: Span = field(factory=lambda: Span(dimension="height", line_color=DARK_GREY))
+    cursors: dict[str, Span] = field(factory=dict)
     line: Span = field(factory=lambda: Span(dimension="width", line_color=DARK_GREY))
 
     def rows(self) -> list[list[Plot]]:
@@ -162,6 +162,7 @@ class _Drawing:
             height=round(DRAWING.row * self.picture.height),
             sizing_mode="stretch_width",
             tools=TOOLS,
+            active_drag="box_zoom",
             match_aspect=panel.equal,
             min_border_left=64,
             **self._shared(panel),
@@ -208,8 +209,8 @@ class _Drawing:
         plot.js_on_event(Tap, CustomJS(args={"line": self.line}, code="line.location = cb_obj.y"))
 
     def _tell(self, plot: Plot, panel: Panel) -> None:
-        """Show values beside the cursor, which all panels share."""
-        told = [renderer for renderer in plot.renderers if TOLD in renderer.tags]
+        """Show values beside the cursor, which panels of one label of x share."""
+        told = [renderer for renderer in plot.renderers if TOLD in renderer.glyph.tags]
         if panel.maps:
             tips = [(panel.x, "$x"), (panel.y, "$y"), (panel.maps[0].label, "@image")]
             plot.add_tools(HoverTool(tooltips=tips))
@@ -218,8 +219,10 @@ class _Drawing:
             tips = [("", "$name"), (panel.x, f"@x{{{shown}}}"), (panel.y, "@y{%.5g}")]
             forms: Any = {"@x": form, "@y": "printf"}
             plot.add_tools(HoverTool(renderers=told, mode="vline", tooltips=tips, formatters=forms))
+        cursor = Span(dimension="height", line_color=DARK_GREY)
+        cursor = self.cursors.setdefault(panel.x, cursor)
         unseen = Span(dimension="width", line_alpha=0.0)
-        plot.add_tools(CrosshairTool(overlay=(self.cursor, unseen)))
+        plot.add_tools(CrosshairTool(overlay=(cursor, unseen)))
 
 
 def _scale(panel: Panel, axis: str) -> Literal["log", "linear"]:

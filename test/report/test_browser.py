@@ -1,0 +1,247 @@
+"""Each of the eight reports in a real browser, which is Debian's chromium."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from attrs import evolve
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
+
+from helpers.report_pages import REPORTS, SPEC, of_scan, of_survey, recorded
+
+CHROMIUM = os.environ.get("AFM_SCAN_CHROMIUM") or shutil.which("chromium")
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="chromium is not installed: apt-get install chromium"
+)
+LARGEST = 3_000_000
+"""Bytes of a report."""
+READY = "window.Bokeh && Bokeh.documents.length === 1 && Bokeh.documents[0].is_idle"
+DESK: ViewportSize = {"width": 1280, "height": 800}
+PHONE: ViewportSize = {"width": 400, "height": 800}
+START = "panel => plotOf(panel).x_range.start"
+FIRST = f"({START})(document.querySelector('.panel'))"
+BACKGROUND = "getComputedStyle(document.body).backgroundColor"
+"""Where a panel begins, by the page's own function."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the eight reports, each under the name of its command."""
+    made = tmp_path_factory.mktemp("reports")
+    bag = recorded(made / "bag")
+    for name, report in REPORTS.items():
+        report(bag).write(made / f"{name}.html", None)
+    return made
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as started:
+        # Root has no sandbox; the pages are our own.
+        yield started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+
+
+@pytest.fixture
+def page(browser: Browser, folder: Path) -> Iterator[Page]:
+    """An empty page, without a network; what it writes to the console fails the test."""
+    del folder
+    said: list[str] = []
+    context = browser.new_context(viewport=DESK, offline=True)
+    shown = context.new_page()
+    shown.on(
+        "request", lambda asked: None if asked.url.startswith("file:") else said.append(asked.url)
+    )
+    shown.on("pageerror", lambda error: said.append(str(error)))
+    shown.on("console", lambda m: said.append(m.text) if m.type in {"error", "warning"} else None)
+    yield shown
+    context.close()
+    assert said == []
+
+
+def opened(page: Page, file: Path) -> Page:
+    page.goto(file.as_uri())
+    page.wait_for_function(READY)
+    return page
+
+
+def serious(page: Page, **options: object) -> list[dict[str, Any]]:
+    """Return what axe finds that keeps someone from reading."""
+    found = Axe().run(page, options=options).response["violations"]
+    return [each for each in found if each["impact"] in {"serious", "critical"}]
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_each_report_answers_zooms_and_is_read_by_everyone(
+    name: str, page: Page, folder: Path
+) -> None:
+    opened(page, folder / f"{name}.html")
+    _answers_above_the_fold(page)
+    _zooms_by_keys(page)
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    assert serious(page) == []
+    light = page.evaluate(BACKGROUND)
+    page.click("#theme")
+    assert page.get_attribute("#theme", "aria-pressed") == "true"
+    assert page.evaluate(BACKGROUND) != light
+    assert serious(page, runOnly=["color-contrast"]) == []
+    page.set_viewport_size(PHONE)
+    page.wait_for_function(f"document.documentElement.scrollWidth <= {PHONE['width']}")
+    assert (folder / f"{name}.html").stat().st_size < LARGEST
+
+
+def _answers_above_the_fold(page: Page) -> None:
+    answer = page.locator(".answer p").last.bounding_box()
+    panel = page.locator("figure .panel canvas").first.bounding_box()
+    assert answer is not None
+    assert panel is not None
+    assert answer["height"] > 0
+    assert answer["y"] + answer["height"] <= panel["y"]
+    assert panel["y"] + panel["height"] <= DESK["height"]
+    assert page.locator(".answer p").count() <= 3
+    assert page.locator("h2").first.inner_text() == "What to do next"
+
+
+def _zooms_by_keys(page: Page) -> None:
+    before = page.evaluate(FIRST)
+    page.locator("figure .panel").first.focus()
+    page.keyboard.press("+")
+    assert page.evaluate(FIRST) > before
+    page.keyboard.press("0")
+    page.wait_for_function(f"before => {FIRST} <= before", arg=before)
+
+
+def test_a_box_zooms_every_panel_over_the_same_time_and_a_value_is_shown(
+    page: Page, folder: Path
+) -> None:
+    opened(page, folder / "analyze.html")
+    panels = page.locator("figure").first.locator(".panel")
+    box = panels.nth(0).bounding_box()
+    assert box is not None
+    before = [panels.nth(k).evaluate(START) for k in range(5)]
+    middle = box["y"] + 0.45 * box["height"]
+    page.mouse.move(box["x"] + 0.4 * box["width"], middle - 15)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.7 * box["width"], middle + 15, steps=4)
+    page.mouse.up()
+    page.wait_for_function(f"before => {FIRST} > before", arg=before[0])
+    after = [panels.nth(k).evaluate(START) for k in range(5)]
+    assert min(after) > max(before)
+    assert max(after) == min(after)
+    page.mouse.move(box["x"] + 0.5 * box["width"], middle)
+    shown = page.locator(".bk-Tooltip").first
+    shown.wait_for(state="visible")
+    assert "time in ms" in shown.inner_text()
+
+
+def picked(page: Page) -> Any:  # noqa: ANN401 - a list of numbers
+    """Values of the line that the demonstration's second row shows."""
+    return page.evaluate(
+        "() => { const plot = plotOf(document.querySelectorAll('figure .panel')[2]);"
+        " return [...plot.renderers[1].data_source.data.y]; }"
+    )
+
+
+def test_a_line_of_an_image_that_is_picked_shows_its_traces(page: Page, folder: Path) -> None:
+    opened(page, folder / "demo.html")
+    before = picked(page)
+    image = page.locator("figure .panel").first.bounding_box()
+    assert image is not None
+    page.mouse.click(image["x"] + 0.5 * image["width"], image["y"] + 0.3 * image["height"])
+    page.wait_for_timeout(400)  # a tap is one only when no second one follows
+    tapped = picked(page)
+    assert tapped != before
+    page.locator("[data-line-of]").first.fill("1")
+    assert picked(page) != tapped
+
+
+def test_a_band_of_the_residual_that_is_picked_shows_its_spectrum(page: Page, folder: Path) -> None:
+    opened(page, folder / "diagnose.html")
+    panels = page.locator("figure").first.locator(".panel")
+    box = panels.nth(0).bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.wait_for_timeout(400)
+    shown = panels.nth(1).evaluate("each => [plotOf(each).x_range.start, plotOf(each).x_range.end]")
+    edges = panels.nth(0).evaluate("each => [...plotOf(each).renderers[0].data_source.data.x]")
+    bands = pairwise(edges)
+    assert shown in [pytest.approx(band, rel=1e-4) for band in bands]
+
+
+def test_links_lead_on(page: Page, folder: Path) -> None:
+    opened(page, folder / "close-loop.html")
+    (folder / "round_1").mkdir(exist_ok=True)
+    shutil.copy(folder / "diagnose.html", folder / "round_1/report.html")
+    page.click("summary")
+    page.click("text=Diagnosis of round 1")
+    page.wait_for_function(READY)
+    assert page.title() == "Diagnosis of a scanner's residual"
+
+
+def test_everything_is_printed(page: Page, folder: Path) -> None:
+    opened(page, folder / "analyze.html")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("details:not([open])").count() == 0
+    page.emulate_media(media="print")
+    assert not page.locator("#theme").is_visible()
+
+
+def test_a_survey_is_sorted_searched_and_leads_to_its_recordings(page: Page, folder: Path) -> None:
+    opened(page, folder / "survey.html")
+    rows, status = page.locator(".listing tbody tr"), page.locator(".listing [role=status]")
+    assert rows.count() == 50
+    assert status.inner_text() == "1 to 50 of 400"
+    page.click("[data-turn='1']")
+    assert status.inner_text() == "51 to 100 of 400"
+    for direction in ("ascending", "descending"):
+        page.click("th button:text('time')")
+        assert page.locator(f"th[aria-sort={direction}] button").inner_text() == "time"
+    times = rows.locator("td:nth-child(3)").all_inner_texts()
+    assert times == sorted(times, reverse=True)
+    page.fill(".listing input", "afm3 effect found")
+    assert status.inner_text() == "1 to 49 of 49"
+    page.click(".listing tbody tr:first-child button")
+    told = page.locator(".listing .opened").inner_text()
+    assert "gain 1.0100 ± 0.0010" in told
+    page.fill(".listing input", "night_00000 afm0")
+    page.click(".listing tbody a")
+    page.wait_for_function(READY)
+    assert page.title() == "A piezoscanner without and with compensation"
+
+
+def test_trends_are_those_of_the_instrument_that_is_chosen(page: Page, folder: Path) -> None:
+    opened(page, folder / "survey.html")
+    values = "() => [...plotOf(document.querySelector('.panel')).renderers[3].data_source.data.y]"
+    changed = page.evaluate(values)
+    assert page.input_value("[data-variant-of]") == "afm3"
+    assert max(changed) > 1.008
+    page.select_option("[data-variant-of]", "afm0")
+    assert max(page.evaluate(values)) < 1.002
+
+
+@pytest.mark.evidence
+def test_ten_thousand_recordings_stay_quick(page: Page, folder: Path) -> None:
+    file = folder / "many.html"
+    of_survey(10_000, 20).write(file, None)
+    opened(page, file)
+    took = page.evaluate(
+        "() => { const start = performance.now();"
+        " const sort = document.querySelector('[data-sort=\"3\"]');"
+        " for (let k = 0; k < 10; k++) { sort.click(); }"
+        " return performance.now() - start; }"
+    )
+    assert took < 10_000.0
+    assert page.locator(".listing tbody tr").count() == 50
+
+
+@pytest.mark.evidence
+def test_a_scan_of_a_million_samples_fits_into_one_report(page: Page, folder: Path) -> None:
+    spec = evolve(SPEC, lines=256, samples_per_line=4000, line_rate=2.0, preparation="none")
+    file = folder / "long.html"
+    of_scan(recorded(folder / "long", spec)).write(file, None)
+    assert file.stat().st_size < LARGEST
+    opened(page, file)
