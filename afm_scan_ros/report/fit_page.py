@@ -40,7 +40,8 @@ def fit_report(found: Identification, model: str) -> ReportPage:
         title="Identification of a scanner",
         answer=list(_answer(found)),
         picture=fit_picture(found),
-        next_steps=[*(f"{name}: {finding_text(one)}" for name, one in warned), *_next(model)],
+        next_steps=list(_next(model)),
+        warnings=[f"{name}: {finding_text(one)}" for name, one in warned],
         evidence=[
             Section("What is known of each effect", [Rows(KNOWN, known)]),
             Section("Fit and prediction of each record", list(_fits(found))),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
-from itertools import chain
+from itertools import chain, cycle
 from math import isqrt
 from typing import Any, Literal
 
@@ -46,6 +46,7 @@ from afm_scan_ros.report.picture import (
 Plot = Any
 """A figure of Bokeh, whose methods make their attributes at run time."""
 TOOLS = "box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
+SIDES: Any = ("right", "left")
 TOLD = "told"
 """Tag of what shows its values beside the cursor."""
 
@@ -73,7 +74,9 @@ class Drawn:
 
 
 def drawn(pictures: Sequence[Picture]) -> Drawn:
-    """Draw pictures, whose names differ."""
+    """Draw pictures, whose names differ; a page of none needs no library."""
+    if not pictures:
+        return Drawn(Markup(), Markup(), {})
     images = sum(len(panel.maps) for picture in pictures for panel in picture.panels)
     finest = min(DRAWING.side, isqrt(DRAWING.pixels // max(1, images)))
     made = {picture.name: _Drawing(coarse(picture, finest)).rows() for picture in pictures}
@@ -218,7 +221,17 @@ class _Drawing:
             shown, form = ("%F %H:%M", "datetime") if panel.dates else ("%.6g", "printf")
             tips = [("", "$name"), (panel.x, f"@x{{{shown}}}"), (panel.y, "@y{%.5g}")]
             forms: Any = {"@x": form, "@y": "printf"}
-            plot.add_tools(HoverTool(renderers=told, mode="vline", tooltips=tips, formatters=forms))
+            for renderer, side in zip(told, cycle(SIDES), strict=False):  # curves that coincide
+                plot.add_tools(
+                    HoverTool(
+                        renderers=[renderer],
+                        mode="vline",
+                        attachment=side,
+                        tooltips=tips,
+                        formatters=forms,
+                        visible=False,
+                    )
+                )
         cursor = Span(dimension="height", line_color=DARK_GREY)
         cursor = self.cursors.setdefault(panel.x, cursor)
         unseen = Span(dimension="width", line_alpha=0.0)

@@ -129,12 +129,12 @@ def test_one_axis_is_diagnosed_as_the_same_axis_of_both(done: Scan, alone: afm.D
 
 
 def test_a_diagnosis_of_one_axis_is_saved(alone: afm.Diagnosis, tmp_path: Path) -> None:
-    alone.save(tmp_path / "out")
+    alone.save(tmp_path / "out", "svg")
     extended = afm.load_model(tmp_path / "out/model.extended.yaml")
     assert extended.axes == alone.model.axes == ("x",)
     names = {file.name for file in (tmp_path / "out").iterdir()}
-    assert {"diagnosis.json", "report.html", "residual_x.png"} <= names
-    assert "residual_y.png" not in names
+    assert {"diagnosis.json", "report.html", "report_residual_x.svg"} <= names
+    assert "report_residual_y.svg" not in names
 
 
 def test_records_and_a_model_that_share_no_axis_are_refused(done: Scan) -> None:

@@ -9,9 +9,10 @@ from markupsafe import escape
 
 from afm_scan_ros.core.identification.findings import UncertainScan
 from afm_scan_ros.core.identification.identify import Identification, identify_records
-from afm_scan_ros.report.fit_figures import response_figure
-from afm_scan_ros.report.fit_page import fit_page
+from afm_scan_ros.report.fit_page import fit_report
+from afm_scan_ros.report.fit_pictures import response_picture
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
+from afm_scan_ros.report.picture import Curve
 from helpers.fit_cases import FREQUENCY, GAIN, OPERATORS, levels, record
 
 
@@ -26,7 +27,7 @@ def found() -> Identification:
 
 @pytest.fixture(scope="module")
 def page(found: Identification) -> str:
-    return fit_page(found)
+    return fit_report(found, "model.yaml").page()
 
 
 def test_figures_of_merit_are_those_of_the_residuals(found: Identification) -> None:
@@ -46,11 +47,12 @@ def test_figures_of_merit_are_those_of_the_residuals(found: Identification) -> N
 
 
 def test_the_response_drawn_is_the_scanner_s(found: Identification) -> None:
-    lines = {line.get_label(): line for line in response_figure(found).axes[0].get_lines()}
+    drawn = response_picture(found).panels[0].marks
+    lines = {line.name: line for line in drawn if isinstance(line, Curve)}
     assert set(lines) == {"levels", "model"}
-    frequency, size = (np.asarray(lines["model"].get_data()[k]) for k in (0, 1))
+    frequency, size = (np.asarray(v) for v in (lines["model"].x, lines["model"].y))
     assert frequency[np.argmax(size)] == pytest.approx(FREQUENCY, rel=0.03)
-    measured_at, measured = (np.asarray(lines["levels"].get_data()[k]) for k in (0, 1))
+    measured_at, measured = (np.asarray(v) for v in (lines["levels"].x, lines["levels"].y))
     near = (measured_at > 20.0) & (measured_at < 0.8 * FREQUENCY)
     expected = np.interp(measured_at[near], frequency, size)
     np.testing.assert_allclose(measured[near], expected, rtol=0.1)
@@ -59,10 +61,9 @@ def test_the_response_drawn_is_the_scanner_s(found: Identification) -> None:
 
 
 def test_the_page_is_whole_and_needs_nothing_else(found: Identification, page: str) -> None:
-    for heading in ("What is known", "Axis x", "Vibration", "Creep and hysteresis"):
-        assert f"<h2>{heading}</h2>" in page
-    assert page.count("data:image/png;base64,") == 3
-    assert 'src="http' not in page
+    for heading in ("What is known of each effect", "Creep and hysteresis", "Model discrepancy"):
+        assert f"<summary>{heading}</summary>" in page
+    assert page.count("<figure>") == 3
     assert "check, held out" in page
     assert f"{found.axes['x'].records[0].misfit.samples:,}" in page
 
@@ -71,5 +72,5 @@ def test_warnings_are_shown(found: Identification) -> None:
     axis = evolve(found.axes["x"], warnings=(UncertainScan(0.034),))
     warned = Identification({"x": axis})
     text = finding_text(UncertainScan(0.034))
-    assert f'<p class="warning">x: {escape(text)}</p>' in fit_page(warned)
+    assert f'<p class="warning">x: {escape(text)}</p>' in fit_report(warned, "model.yaml").page()
     assert fit_summary(warned)["x"]["warnings"] == [text]

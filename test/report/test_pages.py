@@ -4,23 +4,27 @@ import os
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from jinja2 import UndefinedError
 from setuptools import Distribution, find_namespace_packages
 from setuptools.command.build_py import build_py
 
 from afm_scan_ros.report import html
+from afm_scan_ros.report.interactive import drawn
+from afm_scan_ros.report.page import CommandLine, Listing, PageLink
+from afm_scan_ros.report.picture import Curve, Panel, Picture
 from afm_scan_ros.report.table import Rows
 
 ROOT = Path(__file__).parents[2]
-TEMPLATES = sorted((ROOT / "afm_scan_ros").rglob("templates/*.html"))
+TEMPLATES = sorted((ROOT / "afm_scan_ros").rglob("templates/*.*"))
 HOSTILE = "<script>\"a\" 'b' & <b>"
 EVERY_PART = """{% extends "base.html" %}
-{% from "parts.html" import figure, head, row, table, texts, warnings %}
+{% from "parts.html" import command, head, parts, row, table, warnings %}
 {% set title = text %}
 {% block content %}
-{{ warnings([text]) }}{{ head(text) }}{{ row(text) }}{{ texts([text, rows]) }}{{ table(rows) }}
-{% call figure(png) %}{{ text }}{% endcall %}
+{{ warnings([text]) }}{{ head(text) }}{{ row(text) }}{{ table(rows) }}
+{{ parts([text, rows, line, link, listing], drawn) }}{{ parts([picture], drawn) }}
 {% endblock %}
 """
 
@@ -34,12 +38,26 @@ def every_part(tmp_path: Path) -> Path:
 def test_no_text_is_markup(every_part: Path) -> None:
     def made(text: str) -> str:
         rows = Rows((text,), [(text,)], text)
-        return html.page("every_part.html", every_part, text=text, rows=rows, png=b"")
+        panel = Panel([Curve(np.arange(2.0), np.arange(2.0), text)], text, text, text)
+        picture = Picture("one", text, [[panel]], variants={text: [[panel]]})
+        return html.page(
+            "every_part.html",
+            every_part,
+            text=text,
+            rows=rows,
+            line=CommandLine(text, text),
+            link=PageLink(text, text),
+            listing=Listing([text], [[text, text]], 1),
+            picture=picture,
+            drawn=drawn([picture]),
+        )
 
     page = made(HOSTILE)
-    assert page.count("&lt;script&gt;") == made("plain").count("plain") == 13
-    assert page.count("<") == made(HOSTILE.replace("<", "(")).count("<")
-    assert "\"a\" 'b' &" not in page
+    body, bare = (text[text.index("<body>") :] for text in (page, made("plain")))
+    assert bare.count("plain") > 20
+    assert body.count("<") == bare.count("<")
+    assert HOSTILE not in page
+    assert '<script>"a"' not in page
 
 
 @pytest.mark.parametrize("template", TEMPLATES, ids=lambda path: path.name)
@@ -51,7 +69,7 @@ def test_no_template_calls_a_text_markup(template: Path) -> None:
 
 def test_a_value_that_is_missing_is_an_error(every_part: Path) -> None:
     with pytest.raises(UndefinedError, match="rows"):
-        html.page("every_part.html", every_part, text="", png=b"")
+        html.page("every_part.html", every_part, text="", drawn=None)
 
 
 def test_a_wheel_holds_every_template(monkeypatch: pytest.MonkeyPatch) -> None:

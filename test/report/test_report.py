@@ -1,8 +1,6 @@
 """A recorded scan, analysed: terminal, JSON, report and picture, and what ends badly."""
 
 import json
-import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,9 @@ from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.report.analysis import analyse
+from afm_scan_ros.report.paper import paper_figure, save
 from afm_scan_ros.report.quantity import nanometres
-from afm_scan_ros.report.scan_figures import comparison_figure, save, tracking_figure, view_of
+from afm_scan_ros.report.scan_pictures import comparison_picture, tracking_picture, view_of
 from afm_scan_ros.report.scan_report import error_rows
 
 OFFSET = 10e-9
@@ -92,35 +91,14 @@ def test_the_command_writes_the_same_figures_everywhere(
     assert files[2].read_bytes().startswith(b"\x89PNG")
 
 
-class Tags(HTMLParser):
-    """Collects the pictures of a page, and sees that its tags close."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.sources: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag == "img":
-            self.sources.append(dict(attrs)["src"] or "")
-        elif tag != "meta":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
-def test_the_report_needs_nothing_but_itself(
+def test_figures_are_written_beside_the_report(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    afm_scan(monkeypatch, bag, "--report", tmp_path / "a.html")
-    text = (tmp_path / "a.html").read_text("utf-8")
-    tags = Tags()
-    tags.feed(text)
-    assert tags.open == []
-    assert tags.sources
-    assert all(source.startswith("data:image/png;base64,") for source in tags.sources)
-    assert not re.search(r"https?://|<script|<link", text)
+    assert afm_scan(monkeypatch, bag, "--figures", "svg") == 2
+    afm_scan(monkeypatch, bag, "--report", tmp_path / "a.html", "--figures", "svg")
+    figures = sorted(tmp_path.glob("*.svg"))
+    assert [file.stem for file in figures] == ["a_by_line", "a_lines", "a_whole"]
+    assert all(file.read_text("utf-8").startswith("<?xml") for file in figures)
 
 
 def test_a_scan_that_stops_early_is_reported_and_ends_with_status_3(
@@ -162,16 +140,16 @@ def test_every_pattern_can_be_drawn(tmp_path: Path, pattern: str) -> None:
     view = view_of(read_scan(record(tmp_path / "bag", pattern)))
     assert view.desired.x.size == 3 * view.spec.samples_per_line
     assert np.allclose(view.achieved.x - view.desired.x, OFFSET, atol=1e-15)
-    figure = tracking_figure(view)
+    figure = paper_figure(tracking_picture(view))
     assert all(panel.get_xlabel() or panel.get_ylabel() for panel in figure.axes)
     save(figure, tmp_path / "a.png")
-    save(comparison_figure(view, view), tmp_path / "b.svg")
+    save(paper_figure(comparison_picture("30hz", view, view)), tmp_path / "b.svg")
     assert (tmp_path / "b.svg").read_text("utf-8").startswith("<?xml")
 
 
 def test_an_unknown_kind_of_picture_is_refused(bag: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.docx: unknown kind of picture"):
-        save(tracking_figure(view_of(read_scan(bag))), tmp_path / "a.docx")
+        save(paper_figure(tracking_picture(view_of(read_scan(bag)))), tmp_path / "a.docx")
 
 
 def test_a_row_gives_rms_and_largest_in_nm_and_percent(bag: Path) -> None:

@@ -19,10 +19,11 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import paper_figure
 from afm_scan_ros.report.residual import (
     chosen_text,
     initial_state_text,
-    residual_figure,
+    residual_pictures,
     residual_text,
 )
 from helpers.in_process import ALL, default_model, scan
@@ -134,10 +135,14 @@ def test_records_that_are_no_scans_are_drawn_too(healthy: Record) -> None:
     described = describe(evidence, chain_of(default_model().x), evolve(healthy, scan=None))
     assert described.sides is None
     assert "preparation" not in " ".join(residual_text(described, evidence.limit))
-    figure = residual_figure(evidence.limit, described, described)
-    labels = {panel.get_xlabel() for panel in figure.axes}
+    pictures = residual_pictures("x", evidence.limit, described, described)
+    panels = [panel for picture in pictures for panel in picture.panels]
+    labels = {panel.x for panel in panels}
     assert "travel since the last turning point in µm" in labels
-    assert len(figure.axes) == len(labels) == 6
+    assert len(panels) == len(labels) == 7
+    for picture in pictures:
+        drawn = paper_figure(picture).axes
+        assert [axes.get_xlabel() for axes in drawn] == [panel.x for panel in picture.panels]
 
 
 LIMITS = (-4.0, 4.0)
