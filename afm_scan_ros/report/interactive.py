@@ -45,7 +45,7 @@ from afm_scan_ros.report.picture import (
 
 Plot = Any
 """A figure of Bokeh, whose methods make their attributes at run time."""
-TOOLS = "box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
+TOOLS = "auto_box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
 SIDES: Any = ("right", "left")
 TOLD = "told"
 """Tag of what shows its values beside the cursor."""
@@ -165,7 +165,8 @@ class _Drawing:
             height=round(DRAWING.row * self.picture.height),
             sizing_mode="stretch_width",
             tools=TOOLS,
-            active_drag="box_zoom",
+            active_drag="auto_box_zoom",
+            active_scroll=None,
             match_aspect=panel.equal,
             min_border_left=64,
             **self._shared(panel),
