@@ -1,13 +1,11 @@
 """Pictures drawn by Bokeh for pages: they zoom, show values, and share axes and cursor."""
 
 from collections.abc import Mapping, Sequence
-from functools import singledispatch
 from itertools import chain, cycle
 from math import isqrt
 from typing import Any, Literal
 
-import numpy as np
-from attrs import define, evolve, field, frozen
+from attrs import define, field, frozen
 from bokeh.embed import components
 from bokeh.events import Tap
 from bokeh.models import (
@@ -16,39 +14,29 @@ from bokeh.models import (
     CustomJS,
     DataRange1d,
     HoverTool,
-    LinearColorMapper,
     Range1d,
 )
-from bokeh.models.annotations import ColorBar, Span
-from bokeh.palettes import Greys256, RdBu11, interp_palette
+from bokeh.models.annotations import Span
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 from markupsafe import Markup
 
-from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.drawing_settings import DRAWING
+from afm_scan_ros.report.interactive_marks import TOLD, Plot, draw, source_of
 from afm_scan_ros.report.picture import (
     DARK_GREY,
     GREY,
-    Bars,
-    Curve,
     Map,
     Mark,
     Panel,
     PickedLine,
     Picture,
-    Shade,
     Steps,
-    Stretches,
-    thinned,
 )
+from afm_scan_ros.report.reduction import coarse
 
-Plot = Any
-"""A figure of Bokeh, whose methods make their attributes at run time."""
 TOOLS = "auto_box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
 SIDES: Any = ("right", "left")
-TOLD = "told"
-"""Tag of what shows its values beside the cursor."""
 
 PICK_LINE = """
 const values = image.data.image[0], [count, wide] = values.shape;
@@ -91,35 +79,6 @@ def drawn(pictures: Sequence[Picture]) -> Drawn:
     return Drawn(Markup(library), Markup(data), panels)  # noqa: S704 - of Bokeh, which escapes
 
 
-def coarse(picture: Picture, finest: int) -> Picture:
-    """Return a picture whose images have no more lines and pixels: each is the mean of some."""
-    seen: dict[int, Map] = {}
-
-    def reduced(of: Map) -> Map:
-        return seen.setdefault(id(of), evolve(of, values=block_means(of.values, finest)))
-
-    def drawn_by(mark: Mark) -> Mark:
-        if isinstance(mark, PickedLine):
-            return evolve(mark, of=reduced(mark.of))
-        return reduced(mark) if isinstance(mark, Map) else mark
-
-    rows = [
-        [evolve(panel, marks=[drawn_by(mark) for mark in panel.marks]) for panel in row]
-        for row in picture.rows
-    ]
-    return evolve(picture, rows=rows)
-
-
-def block_means(values: Array, finest: int) -> Array:
-    """Return the means of neighbouring lines and pixels, so few that none exceeds ``finest``."""
-    for axis, count in enumerate(values.shape):
-        starts = np.unique(np.linspace(0, count, min(count, finest) + 1).astype(int)[:-1])
-        sizes = np.diff(np.append(starts, count))
-        shape = (-1, 1) if axis == 0 else (1, -1)
-        values = np.add.reduceat(values, starts, axis=axis) / sizes.reshape(shape)
-    return values
-
-
 @define(eq=False)
 class _Drawing:
     """A picture that is being drawn, and what its panels share."""
@@ -145,7 +104,7 @@ class _Drawing:
         """Give the page the data of each variant, under the number of what they replace."""
         for name, other in self.picture.variants.items():
             for plot, panel in zip(chain(*rows), chain(*other), strict=True):
-                sources = [_source(mark) for mark in panel.marks]
+                sources = [source_of(mark) for mark in panel.marks]
                 for number, source in enumerate(sources):
                     source.name = f"{name}/{number}"
                 plot.tags = [*plot.tags, *sources]
@@ -182,14 +141,14 @@ class _Drawing:
         return plot
 
     def _add(self, mark: Mark, plot: Plot) -> None:
-        source = _source(mark)
-        _draw(mark, plot, source)
+        source = source_of(mark)
+        draw(mark, plot, source)
         if isinstance(mark, Map):
             self.images[id(mark)] = source
         if isinstance(mark, PickedLine):
             of = mark.of
             if id(of) not in self.images:
-                self.images[id(of)] = _source(of)
+                self.images[id(of)] = source_of(of)
             ends: dict[str, Any] = {"bottom": of.bottom, "top": of.top}
             args = {"line": self.line, "source": source, "image": self.images[id(of)], **ends}
             self.line.js_on_change("location", CustomJS(args=args, code=PICK_LINE))
@@ -241,110 +200,3 @@ class _Drawing:
 
 def _scale(panel: Panel, axis: str) -> Literal["log", "linear"]:
     return "log" if axis in panel.log else "linear"
-
-
-def _single(values: Any) -> Any:  # noqa: ANN401 - dates too
-    """Half as many bytes, of which no eye sees a difference; dates need all."""
-    values = np.asarray(values)
-    return values if values.dtype.kind == "M" else values.astype(np.float32)
-
-
-@singledispatch
-def _columns(mark: Any) -> dict[str, Any]:  # noqa: ANN401 - of whatever kind is registered
-    """Return what is drawn of a mark, by the names that ``_draw`` has for it."""
-    return {"x": mark.x, "low": mark.low, "high": mark.high}
-
-
-@_columns.register
-def _(mark: Curve) -> dict[str, Any]:
-    shown = thinned(mark)
-    return {"x": shown.x, "y": shown.y}
-
-
-@_columns.register
-def _(mark: Steps) -> dict[str, Any]:
-    return {"x": mark.edges, "y": np.append(mark.values, mark.values[-1])}
-
-
-@_columns.register
-def _(mark: Stretches) -> dict[str, Any]:
-    starts, ends = np.reshape(np.array(mark.ends), (-1, 2)).T
-    return {"x0": starts, "x1": ends}
-
-
-@_columns.register
-def _(mark: Map) -> dict[str, Any]:
-    return {"image": [mark.values]}
-
-
-@_columns.register
-def _(mark: PickedLine) -> dict[str, Any]:
-    return {"x": mark.of.across, "y": mark.of.values[len(mark.of.values) // 2]}
-
-
-def _source(mark: Mark) -> ColumnDataSource:
-    columns = _columns(mark)
-    return ColumnDataSource(
-        {
-            name: [_single(v) for v in values] if isinstance(values, list) else _single(values)
-            for name, values in columns.items()
-        }
-    )
-
-
-def _style(mark: Any, source: ColumnDataSource, **more: object) -> dict[str, Any]:  # noqa: ANN401 - any but Map
-    named = {"name": mark.name} if mark.name else {}
-    return {"source": source, "color": mark.colour, **named, **more}
-
-
-@singledispatch
-def _draw(mark: Any, plot: Plot, source: ColumnDataSource) -> None:  # noqa: ANN401 - as above
-    raise TypeError(f"{type(mark).__name__} is no mark, for {plot} and {source}")
-
-
-@_draw.register
-def _(mark: Curve, plot: Plot, source: ColumnDataSource) -> None:
-    if mark.dots:
-        plot.scatter("x", "y", size=4, **_style(mark, source, tags=[TOLD]))
-    else:
-        dash = "dashed" if mark.dashed else "solid"
-        style = _style(mark, source, tags=[TOLD], line_width=mark.width, line_dash=dash)
-        plot.line("x", "y", **style)
-
-
-@_draw.register
-def _(mark: Shade, plot: Plot, source: ColumnDataSource) -> None:
-    plot.varea("x", "low", "high", **_style(mark, source, alpha=0.3))
-
-
-@_draw.register
-def _(mark: Steps, plot: Plot, source: ColumnDataSource) -> None:
-    dash = "dashed" if mark.dashed else "solid"
-    style = _style(mark, source, tags=[TOLD], line_width=1.6, line_dash=dash)
-    plot.step("x", "y", mode="after", **style)
-
-
-@_draw.register
-def _(mark: Bars, plot: Plot, source: ColumnDataSource) -> None:
-    plot.segment("x", "low", "x", "high", **_style(mark, source, line_width=mark.width))
-
-
-@_draw.register
-def _(mark: Stretches, plot: Plot, source: ColumnDataSource) -> None:
-    style = _style(mark, source, level="underlay", fill_alpha=0.3, line_alpha=0.0)
-    plot.vstrip("x0", "x1", **style)
-
-
-@_draw.register
-def _(mark: Map, plot: Plot, source: ColumnDataSource) -> None:
-    palette = interp_palette(RdBu11, 255) if mark.signed else Greys256
-    colours = LinearColorMapper(palette=palette, low=mark.low, high=mark.high)
-    size = {"dw": mark.right - mark.left, "dh": mark.top - mark.bottom}
-    corner = {"x": mark.left, "y": mark.bottom}
-    plot.image("image", source=source, color_mapper=colours, **corner, **size)
-    plot.add_layout(ColorBar(color_mapper=colours, title=mark.label, width=10, padding=4), "right")
-
-
-@_draw.register
-def _(mark: PickedLine, plot: Plot, source: ColumnDataSource) -> None:
-    plot.line("x", "y", **_style(mark, source, tags=[TOLD], line_width=1.3))

@@ -21,8 +21,8 @@ from afm_scan_ros.report.picture import (
     Shade,
     Steps,
     Stretches,
-    thinned,
 )
+from afm_scan_ros.report.reduction import thinned
 from afm_scan_ros.report.style import blank, legend_above, styled
 
 FORMATS = ("pdf", "svg", "png")

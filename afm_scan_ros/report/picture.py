@@ -11,7 +11,6 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.drawing_settings import DRAWING
 
 Places: TypeAlias = Array | NDArray[np.datetime64]
 """Where marks lie on the axis of x; times are dates."""
@@ -179,29 +178,3 @@ class Picture:
         """Lines among which one is picked; 0 where the picture shows no image of lines."""
         picked = (m.of for p in self.panels for m in p.marks if isinstance(m, PickedLine))
         return next((len(of.values) for of in picked), 0)
-
-
-def extremes(y: Array, bins: int) -> NDArray[np.intp]:
-    """Return the places of the lowest and the highest value of each of so many stretches.
-
-    They rise, and the first and the last sample are among them. A stretch of NaN alone gives its
-    first place. The peaks of a curve that is drawn through these places are those of all samples.
-    """
-    if y.size <= 2 * bins:
-        return np.arange(y.size)
-    starts = np.linspace(0, y.size, bins + 1).astype(int)[:-1]
-    lengths = np.diff(np.append(starts, y.size))
-    within = np.arange(lengths.max())
-    places = np.minimum(starts[:, np.newaxis] + within, y.size - 1)
-    inside = within < lengths[:, np.newaxis]
-    known = np.isfinite(y[places]) & inside
-    lowest = np.argmin(np.where(known, y[places], np.inf), axis=1)
-    highest = np.argmax(np.where(known, y[places], -np.inf), axis=1)
-    found: NDArray[np.intp] = np.unique([*(starts + lowest), *(starts + highest), 0, y.size - 1])
-    return found
-
-
-def thinned(curve: Curve, bins: int = DRAWING.stretches) -> Curve:
-    """Return a curve with no more points than are seen: each peak stays."""
-    kept = extremes(curve.y, bins)
-    return evolve(curve, x=curve.x[kept], y=curve.y[kept])

@@ -57,11 +57,6 @@ def blank(width: float, height: float, title: str = "") -> Figure:
     return figure
 
 
-def zero_line(panel: Axes) -> None:
-    """Draw where a quantity is zero, behind all else."""
-    panel.axhline(0.0, color=STYLE["axes.edgecolor"], lw=0.6, zorder=0)
-
-
 def legend_above(panel: Axes, columns: int = 3) -> None:
     """Explain what a panel shows, if anything, in rows above it."""
     if panel.get_legend_handles_labels()[0]:

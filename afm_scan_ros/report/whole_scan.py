@@ -25,9 +25,8 @@ from afm_scan_ros.report.picture import (
     Panel,
     PickedLine,
     Picture,
-    extremes,
-    thinned,
 )
+from afm_scan_ros.report.reduction import extremes, thinned
 from afm_scan_ros.report.scan_pictures import DRIVE, LOW, topics_shown
 
 TIME = "time in s"

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from afm_scan_ros.report.interactive import block_means
-from afm_scan_ros.report.picture import Curve, extremes, thinned
+from afm_scan_ros.report.picture import Curve
+from afm_scan_ros.report.reduction import block_means, extremes, thinned
 
 VALUES = st.floats(-1e6, 1e6, width=32)
 CURVES = arrays.arrays(np.float64, st.integers(1, 400), elements=VALUES | st.just(np.nan))
