@@ -73,7 +73,8 @@ def analyze(
     if json_file is not None:
         write_text(json_file, json.dumps(plain(analysis), indent=2) + "\n")
     if report is not None:
-        scan_report(analysis, recording).write(report, figures)
+        with working("writing the report", at_once=False):
+            scan_report(analysis, recording).write(report, figures)
     if figure is not None:
         from afm_scan_ros.report.paper import paper_figure, save  # noqa: PLC0415 - by matplotlib
 
