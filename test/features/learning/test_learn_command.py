@@ -71,7 +71,7 @@ def test_report_table_and_correction_agree(tmp_path: Path) -> None:
     learned = load_learned(tmp_path / "out/learned.npz")
     assert learned.correction.spec == SPEC
     page = (tmp_path / "out/report.html").read_text("utf-8")
-    assert page.count("<img") == 3
+    assert page.count("<figure>") == 3
     assert f"number {found['best_scan']}" in page
 
 
