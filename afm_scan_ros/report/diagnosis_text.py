@@ -99,12 +99,15 @@ def result(found: ScannerDiagnosis) -> Iterator[Part]:
 
 
 def brief(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield what the model lacks in a sentence where effects are found, or else the verdicts."""
+    """Yield what the model lacks where effects are found, or else the verdicts but a sufficient."""
     named = [f"{effect.name.replace('_', ' ')} in {effect.axis}" for effect in found.effects]
     if found.verdict == FOUND and named:
         yield f"The model lacks {' and '.join(named)}, with a probability of 95 % or more."
-    else:
-        yield from verdict_text(found)
+        return
+    lacking = [(a, d.verdict) for a, d in found.by_axis.items() if d.verdict != SUFFICIENT]
+    yield from (f"{axis}: {VERDICTS[verdict]}" for axis, verdict in lacking)
+    if not lacking:
+        yield VERDICTS[found.verdict]
 
 
 def effects(found: ScannerDiagnosis) -> Iterator[Rows]:

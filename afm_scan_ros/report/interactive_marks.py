@@ -9,6 +9,7 @@ from bokeh.models.annotations import ColorBar
 from bokeh.palettes import Greys256, RdBu11, interp_palette
 
 from afm_scan_ros.report.picture import (
+    DARK_GREY,
     Bars,
     Curve,
     Map,
@@ -127,7 +128,10 @@ def _(mark: Map, plot: Plot, source: ColumnDataSource) -> None:
     size = {"dw": mark.right - mark.left, "dh": mark.top - mark.bottom}
     corner = {"x": mark.left, "y": mark.bottom}
     plot.image("image", source=source, color_mapper=colours, **corner, **size)
-    plot.add_layout(ColorBar(color_mapper=colours, title=mark.label, width=10, padding=4), "right")
+    text = {"major_label_text_color": DARK_GREY, "title_text_color": DARK_GREY}
+    shape = {"width": 10, "padding": 4, "background_fill_alpha": 0.0}
+    bar = ColorBar(color_mapper=colours, title=mark.label, **text, **shape)  # type: ignore[arg-type]
+    plot.add_layout(bar, "right")
 
 
 @draw.register

@@ -83,6 +83,7 @@ def test_each_report_answers_zooms_and_is_read_by_everyone(
 ) -> None:
     opened(page, folder / f"{name}.html")
     _answers_above_the_fold(page)
+    page.screenshot(path=folder / f"{name}.png")
     _zooms_by_keys(page)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
     assert serious(page) == []
