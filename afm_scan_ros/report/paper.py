@@ -127,7 +127,7 @@ def _(mark: Map, axes: Axes) -> None:
         extent=mark.span,
         aspect="auto",
     )
-    axes.get_figure(root=True).colorbar(drawn, ax=axes, label=mark.label)  # type: ignore[union-attr]
+    axes.figure.colorbar(drawn, ax=axes, label=mark.label)
 
 
 @_draw.register
