@@ -13,7 +13,7 @@ from afm_scan_ros.cli import main as command
 from afm_scan_ros.core.errors import InputError, ScanError
 
 BENCHMARKS = entry_points(group=command.PLUGINS, name="bench")
-HEAVY = ("numpy", "scipy", "matplotlib", "numba", "rosbags")
+HEAVY = ("numpy", "scipy", "matplotlib", "bokeh", "numba", "rosbags")
 
 Run = Callable[..., tuple[int, str]]
 
