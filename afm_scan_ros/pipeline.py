@@ -19,7 +19,13 @@ from typing import Any
 import numpy as np
 from attrs import define, field, frozen
 
-from afm_scan_ros.bag.live import TRUE, LiveRecorder, LiveWriter, ScanListener
+from afm_scan_ros.bag.live import (
+    TRUE,
+    BlockViewer,
+    LiveRecorder,
+    LiveWriter,
+    ScanListener,
+)
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.scan_info import ScanInfo
@@ -62,8 +68,10 @@ class ScanChain:
     safety: SafetySettings = field(factory=SafetySettings)
 
 
-def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
-    """Run a scan, and record it in a bag.
+def run(
+    chain: ScanChain, bag: Path, listener: ScanListener, viewers: Sequence[BlockViewer] = ()
+) -> None:
+    """Run a scan, and record it in a bag; ``viewers`` see what is recorded.
 
     Raises InputError before it begins, ScanError where it stays incomplete, and KeyboardInterrupt
     after SIGINT or SIGTERM. The outputs are at rest then, and the bag holds what was recorded.
@@ -80,7 +88,7 @@ def run(chain: ScanChain, bag: Path, listener: ScanListener) -> None:
                 handling(lambda number, _: interrupted.append(number)),
                 _ramping_down(chain, driver),
             ):
-                recorder = LiveRecorder(writer, chain.info, listener)
+                recorder = LiveRecorder(writer, chain.info, listener, viewers)
                 _Flow(chain, driver, pool, recorder, interrupted).run()
         except (InputError, ScanError) as error:
             output.seek(0)

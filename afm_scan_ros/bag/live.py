@@ -1,7 +1,7 @@
 """Writes the bag of a scan that is going on, with all that its monitors find, without nodes."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -37,6 +37,16 @@ class ScanListener(Protocol):
         """Hear what the user should know."""
 
 
+class BlockViewer(Protocol):
+    """Sees what a scan records; it must return at once, and raise nothing."""
+
+    def block(self, name: str, block: Trace) -> None:
+        """See the next block of a stream."""
+
+    def line(self, name: str, figures: LineError) -> None:
+        """See the figures of a line, as of ``model_residual``."""
+
+
 class LiveWriter(ScanWriter):
     """A bag with a scan that is going on, as the nodes' recorder writes it.
 
@@ -65,8 +75,15 @@ class LiveWriter(ScanWriter):
 class LiveRecorder:
     """Monitors and writes the blocks of a scan, those of a sample's drive before its answer."""
 
-    def __init__(self, bag: LiveWriter, info: ScanInfo, listener: ScanListener) -> None:
+    def __init__(
+        self,
+        bag: LiveWriter,
+        info: ScanInfo,
+        listener: ScanListener,
+        viewers: Sequence[BlockViewer] = (),
+    ) -> None:
         self._bag, self._info, self._listener = bag, info, listener
+        self._viewers = viewers
         self._errors: LineErrors | None = None
         if info.spec is not None:
             self._errors = LineErrors(phases(info.spec).lines, info.spec.samples_per_line)
@@ -76,6 +93,9 @@ class LiveRecorder:
     def add(self, name: str, block: Trace) -> None:
         """Write the next block of a stream, and what follows from it."""
         self._bag.add(name, block)
+        if name != TRUE:
+            for viewer in self._viewers:
+                viewer.block(name, block)
         if name == ACHIEVED:
             self._listener.moved(end(block), self._info.total_samples)
         if self._errors is None or name == TRUE:
@@ -90,6 +110,8 @@ class LiveRecorder:
         for found in monitor.add(name, block):
             if not isinstance(found, ScanNews):
                 self._bag.add_line("model_residual", found)
+                for viewer in self._viewers:
+                    viewer.line("model_residual", found)
             elif not found.expected and found.text != self._said:
                 self._said = found.text
                 self._listener.say(f"residual_monitor: {found.text}")

@@ -1,8 +1,10 @@
 """A scan or a record by nodes, a process each; needs ROS."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 
 from attrs import evolve
 
@@ -19,6 +21,7 @@ from afm_scan_ros.cli.orders import (
 )
 from afm_scan_ros.cli.processes import PATIENCE, NodeCommand, isolate, run_nodes
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
+from afm_scan_ros.cli.viewing import VIEWS
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -37,7 +40,7 @@ def scan(order: ScanOrder) -> None:
     """Scan; raises InputError before it begins, ScanError where it stays incomplete."""
     paced = _pace(order.time_scale)
     commands = [_with(c, {**paced, **order.own.get(c.name, {})}) for c in _scan_commands(order)]
-    _run(commands, order.scanner, f"scan to {order.files.bag}")
+    _run(commands, order.scanner, f"scan to {order.files.bag}", order.views)
 
 
 def record(order: RecordOrder) -> None:
@@ -49,10 +52,17 @@ def record(order: RecordOrder) -> None:
         _run(commands, order.scanner, order.title)
 
 
-def _run(commands: Sequence[NodeCommand], scanner: ScannerChoice, title: str) -> None:
+def _run(
+    commands: Sequence[NodeCommand],
+    scanner: ScannerChoice,
+    title: str,
+    views: Mapping[str, str] = MappingProxyType({}),
+) -> None:
     if not scanner.external:
         isolate()
-    with watching(title) as idle:
+    with watching(title) as (shown, idle), ExitStack() as open_views:
+        for name, where in views.items():
+            open_views.enter_context(VIEWS[name].beside_nodes(where, shown))
         run_nodes(commands, idle, [scanner.node])
 
 

@@ -1,6 +1,7 @@
 """Executes what is ordered: by nodes where there is ROS, in this process elsewhere."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,11 @@ from typing import Any
 import click
 from attrs import evolve
 
+from afm_scan_ros.bag.live import BlockViewer, ScanListener
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
+from afm_scan_ros.cli.viewing import VIEWS
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
@@ -94,8 +97,14 @@ def _scan(order: orders.ScanOrder) -> None:
         monitor=monitor,
         **_flowing(info, flow),
     )
-    with showing(f"scan to {files.bag}") as shown:
-        run(chain, files.bag, shown)
+    listener: ScanListener
+    viewers: list[BlockViewer] = []
+    with showing(f"scan to {files.bag}") as listener, ExitStack() as open_views:
+        for name, where in order.views.items():
+            view = VIEWS[name].beside_pipeline(where, info, listener)
+            listener = seen = open_views.enter_context(view)
+            viewers.append(seen)
+        run(chain, files.bag, listener, viewers)
 
 
 def _record(order: orders.RecordOrder) -> None:

@@ -49,8 +49,8 @@ class ScanWatch:
 
 
 @contextmanager
-def watching(title: str) -> Iterator[Callable[[], None]]:
-    """Show a scan while it runs; yield a function that listens for a moment."""
+def watching(title: str) -> Iterator[tuple[ScanProgress, Callable[[], None]]]:
+    """Show a scan while it runs; yield what shows it, and a function that listens for a moment."""
     join([])
     try:
         with showing(title) as shown:
@@ -59,7 +59,7 @@ def watching(title: str) -> Iterator[Callable[[], None]]:
             for topic, hear in ((SCAN_INFO, watch.meet), (NODE_STATE, watch.hear)):
                 node.create_subscription(topic.kind, topic.name, hear, topic.reader)
             executor.add_node(node)
-            yield lambda: executor.spin_once(timeout_sec=MOMENT)
+            yield shown, lambda: executor.spin_once(timeout_sec=MOMENT)
             executor.shutdown()
     finally:
         rclpy.shutdown()

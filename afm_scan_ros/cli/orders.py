@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from attrs import frozen
+from attrs import field, frozen
 
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scanner import SIM, ScannerChoice
@@ -44,7 +44,7 @@ class ScanOrder:
 
     ``flow`` are parameters of its source that its file sets. ``own`` are those of the other parts
     by their names, before those of their files. With ``images`` it is imaged, ``watched`` its
-    residual is monitored.
+    residual is monitored. ``views`` say where each viewer shows it, by the viewer's name.
     """
 
     files: ScanFiles
@@ -57,6 +57,7 @@ class ScanOrder:
     own: Mapping[str, Parameters]
     images: bool
     watched: bool
+    views: Mapping[str, str] = field(factory=dict)
 
 
 @frozen(eq=False)

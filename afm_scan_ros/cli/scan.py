@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import click
 
@@ -30,6 +31,7 @@ from afm_scan_ros.cli.scanner import (
     scanner_options,
     time_scale_option,
 )
+from afm_scan_ros.cli.viewing import VIEWS
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
@@ -52,14 +54,15 @@ def run_scan(
     *,
     images: bool = False,
     watched: bool = False,
+    views: Mapping[str, str] = MappingProxyType({}),
     **online: bool,
 ) -> None:
     """Run one scan by the file, by default in real time, or in simulation without waiting.
 
     ``further`` are parameters of nodes, by their names. With ``images`` it is also imaged,
-    where it has lines of more samples than pixels; ``watched``, its residual too. ``online`` says
-    what features do during the scan. Raises InputError before it begins, ScanError where it stays
-    incomplete; the bag is then set aside.
+    where it has lines of more samples than pixels; ``watched``, its residual too. ``views`` say
+    where each viewer shows it, and ``online`` what features do during the scan. Raises InputError
+    before it begins, ScanError where it stays incomplete; the bag is then set aside.
     """
     refuse_existing(files.bag)
     model = load_model(files.model)
@@ -70,6 +73,8 @@ def run_scan(
         time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
     refuse_pace(time_scale)
     online = {**dict.fromkeys(ONLINE, False), **online}
+    for name, where in views.items():
+        VIEWS[name].refuse(where)
     _refuse_unsuited(spec, files.scanner, [name for name, wanted in online.items() if wanted])
     correction = _correction(files.learned, spec, model, inverses)
     if (exchange := exchange_of(files.scanner)) is not None:
@@ -79,7 +84,7 @@ def run_scan(
     own = _own(files, scanner, online)
     every = {part: {**own.get(part, {}), **further.get(part, {})} for part in {*own, *further}}
     order = ScanOrder(
-        files, spec, flow, model, inverses, scanner, time_scale, every, images, watched
+        files, spec, flow, model, inverses, scanner, time_scale, every, images, watched, views
     )
     try:
         execute_scan(order)
@@ -143,8 +148,12 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
     return DriveLimits(min(voltage, amplifier.voltage_limit), min(slew, amplifier.slew_limit))
 
 
-def _online_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of features to a command, a flag each."""
+def _options_of_features(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of features to a command: a flag each, and where each viewer shows it."""
+    for name, view in reversed([*VIEWS.items()]):
+        command = click.option(
+            f"--{name}", is_flag=False, flag_value=view.usual, metavar="[FILE]", help=view.help
+        )(command)
     for name, each in reversed([*ONLINE.items()]):
         flag = f"--{name.replace('_', '-')}"
         command = click.option(flag, is_flag=True, help=each.help)(command)
@@ -166,7 +175,7 @@ def _online_options(command: Callable[..., None]) -> Callable[..., None]:
     "--watch", "watched", is_flag=True, help="Compare the scanner with the model during the scan."
 )
 @click.option("--learned", type=FILE, help="Correction of this scan that 'afm-scan learn' wrote.")
-@_online_options
+@_options_of_features
 @click.option("--bag", required=True, type=BAG, help="Folder to create for the bag.")
 def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     spec: Path,
@@ -179,7 +188,7 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
     bag: Path,
     *,
     watched: bool,
-    **online: bool,
+    **of_features: Any,  # noqa: ANN401 - a flag or a place
 ) -> None:
     """Make one scan and record it."""
     run_scan(
@@ -189,6 +198,7 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
         {},
         images=True,
         watched=watched,
-        **online,
+        views={name: of_features[name] for name in VIEWS if of_features[name]},
+        **{name: of_features[name] for name in ONLINE},
     )
     click.echo(f"Recorded {bag}.")

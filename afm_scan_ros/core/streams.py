@@ -152,13 +152,24 @@ class LineErrors:
     def add(self, name: str, block: Trace) -> Iterator[LineError]:
         """Take a block of one of the two topics; yield the lines that it makes whole."""
         for number, line in self._errors.add(name, block):
-            rms_x, rms_y = (float(value) for value in np.sqrt(np.mean(line**2, axis=1)))
-            max_x, max_y = (float(value) for value in np.abs(line).max(axis=1))
-            yield LineError(number, self._lines[number], rms_x, rms_y, max_x, max_y)
+            yield line_error(number, self._lines[number], line)
+
+
+def line_error(number: int, first_sample: int, error: Array) -> LineError:
+    """Return the figures of the error of a line, m, (2, samples)."""
+    rms_x, rms_y = (float(value) for value in np.sqrt(np.mean(error**2, axis=1)))
+    max_x, max_y = (float(value) for value in np.abs(error).max(axis=1))
+    return LineError(number, first_sample, rms_x, rms_y, max_x, max_y)
 
 
 MONITOR_RATE = 200.0
 """Samples a second, at most."""
+
+
+def monitor_step(sample_period: float) -> int:
+    """Return the number of samples (period in s) from one sample for viewers to the next."""
+    return ceil(1.0 / (MONITOR_RATE * sample_period) - 1e-9)
+
 
 DRIVE = "drive_voltage"
 
@@ -186,7 +197,7 @@ class MonitorSamples:
     """
 
     def __init__(self, sample_period: float) -> None:
-        self._step = ceil(1.0 / (MONITOR_RATE * sample_period) - 1e-9)
+        self._step = monitor_step(sample_period)
         self._aligner = Aligner(("desired_displacement", "achieved_displacement"))
         self._drive: deque[Trace] = deque()
 

@@ -1,9 +1,10 @@
 """Features: each folder here holds all of one subject, and states what it adds to the kernel.
 
 A feature is a package that may state ``COMMANDS``, what each of its commands does, ``DRIVERS``, the
-class of each of its drivers by short name, and ``ONLINE``, the place of each ``OnlineOption`` of a
-scan. The command NAME stands in ``NAME_command`` of the package. The kernel knows features by this
-registry alone, and no feature imports another.
+class of each of its drivers by short name, ``ONLINE``, the place of each ``OnlineOption`` of a
+scan, and ``VIEWS``, that of each ``ScanView`` beside one. The command NAME stands in
+``NAME_command`` of the package. The kernel knows features by this registry alone, and no feature
+imports another.
 """
 
 import pkgutil
@@ -33,6 +34,11 @@ def drivers() -> Mapping[str, str]:
 def options() -> Mapping[str, Any]:
     """Return what features do while a scan runs, an ``OnlineOption`` each, by its name."""
     return {name: pkgutil.resolve_name(place) for name, place in _joined("ONLINE").items()}
+
+
+def views() -> Mapping[str, Any]:
+    """Return the viewers that features open beside a scan, a ``ScanView`` each, by its name."""
+    return {name: pkgutil.resolve_name(place) for name, place in _joined("VIEWS").items()}
 
 
 def module_of(command: str) -> str:

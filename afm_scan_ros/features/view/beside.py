@@ -1,0 +1,120 @@
+"""Opens a view beside a scan: a process of its own, which gets blocks or listens to nodes."""
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from tempfile import TemporaryFile
+
+import numpy as np
+from attrs import asdict, frozen
+
+from afm_scan_ros.bag.live import ScanListener
+from afm_scan_ros.bag.scan_info import encode_info
+from afm_scan_ros.cli.viewing import ScanView
+from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.core.streams import LineError
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.link import Message
+from afm_scan_ros.features.view import kinds
+from afm_scan_ros.features.view.handover import Handover
+from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import WINDOW, refuse
+
+_RUN = "import sys; from afm_scan_ros.features.view.process import main; main(*sys.argv[1:])"
+
+
+@frozen(eq=False)
+class Feed:
+    """Hears how a scan goes on, and passes it on to another listener and to the viewer."""
+
+    _handover: Handover
+    _listener: ScanListener
+
+    def doing(self, what: str) -> None:
+        """Hear what is done before the scan begins."""
+        self._listener.doing(what)
+        self._handover.news(Message(kinds.DOING, {"what": what}))
+
+    def moved(self, sample: int, total: int) -> None:
+        """Hear how far the scan is; the viewer sees that by its blocks."""
+        self._listener.moved(sample, total)
+
+    def say(self, news: str) -> None:
+        """Hear what the user should know."""
+        self._listener.say(news)
+        self._handover.news(Message(kinds.SAY, {"text": news}))
+
+    def block(self, name: str, block: Trace) -> None:
+        """Take the next block of a stream."""
+        where = {"name": name, "first_sample": block.first_sample}
+        self._handover.block(Message(kinds.BLOCK, where, np.stack([block.x, block.y])))
+
+    def line(self, name: str, figures: LineError) -> None:
+        """Take the figures of a line that the viewer does not compute itself."""
+        self._handover.news(Message(kinds.LINE, {"name": name, "figures": asdict(figures)}))
+
+
+@contextmanager
+def beside_pipeline(
+    settings: ViewSettings, where: str, info: ScanInfo, listener: ScanListener
+) -> Iterator[Feed]:
+    """Show a scan of this process while it runs."""
+    with _viewing(kinds.PIPELINE, where, settings, listener) as handover:
+        handover.news(Message(kinds.SCAN, {"info": encode_info(info).hex()}))
+        try:
+            yield Feed(handover, listener)
+        except BaseException as error:
+            why = str(error) or "interrupted"
+            handover.news(Message(kinds.ENDED, {"state": "failed", "reason": why}))
+            raise
+        handover.news(Message(kinds.ENDED, {"state": "done", "reason": ""}))
+
+
+@contextmanager
+def beside_nodes(settings: ViewSettings, where: str, listener: ScanListener) -> Iterator[None]:
+    """Show what the nodes of a scan publish while it runs."""
+    with _viewing(kinds.NODES, where, settings, listener):
+        yield
+
+
+@contextmanager
+def _viewing(
+    source: str, where: str, settings: ViewSettings, listener: ScanListener
+) -> Iterator[Handover]:
+    """Run the viewer's process; at the end it has ``closing`` to show the rest."""
+    ours, theirs = socket.socketpair()
+    with ours, TemporaryFile("w+", encoding="utf-8") as output:
+        with theirs:
+            process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
+                [sys.executable, "-P", "-c", _RUN, str(theirs.fileno()), source, where],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+        handover = Handover(ours, settings)
+        try:
+            yield handover
+        finally:
+            deadline = time.monotonic() + settings.closing
+            handover.close(settings.closing)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.0, deadline - time.monotonic()))
+            output.seek(0)
+            if process.returncode and (said := output.read().strip()):
+                listener.say(f"--view: {said.splitlines()[-1]}")
+
+
+_SETTINGS = ViewSettings()
+VIEW = ScanView(
+    help="Open a viewer beside the scan, or name a file to write that it shows later.",
+    usual=WINDOW,
+    refuse=partial(refuse, option="--view"),
+    beside_pipeline=partial(beside_pipeline, _SETTINGS),
+    beside_nodes=partial(beside_nodes, _SETTINGS),
+)

@@ -1,0 +1,109 @@
+"""What is shown of blocks of samples, of a bag or a pipeline, some of which may be missing."""
+
+import numpy as np
+
+from afm_scan_ros.core.image_lines import Frame, frame_of, pixel_means
+from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.streams import (
+    ACHIEVED,
+    DESIRED,
+    Aligner,
+    WholeLines,
+    end,
+    line_error,
+    monitor_step,
+    part,
+)
+from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
+from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.features.view.screen import ERROR, Screen
+from afm_scan_ros.report.style import NANO
+
+COMPARED = (DESIRED, ACHIEVED)
+
+
+class ShownBlocks:
+    """Takes the blocks of each stream of one scan, and shows them on a screen.
+
+    Curves have each sample that is a multiple of the step of the topic ``monitor``. Where a block
+    is missing, errors are known again from where both streams are, or from the next line on.
+    """
+
+    def __init__(self, info: ScanInfo, screen: Screen, pixels: int) -> None:
+        self._screen, self._step = screen, monitor_step(info.sample_period)
+        self._next = dict.fromkeys(COMPARED, 0)
+        self._from, self._aligner = 0, Aligner(COMPARED)
+        self._lines = None if info.spec is None else ShownLines(info.spec, screen, pixels)
+
+    def add(self, name: str, block: Trace) -> None:
+        """Show the next block of a stream."""
+        self._curve(name, block)
+        if name not in COMPARED:
+            return
+        if block.first_sample != self._next[name]:
+            self._resume(max(block.first_sample, *self._next.values()))
+        self._next[name] = end(block)
+        if end(block) > self._from:
+            first = max(block.first_sample, self._from)
+            self._aligner.add(name, part(block, first, end(block)))
+        for desired, achieved in self._aligner.ready():
+            error = Trace(
+                desired.first_sample,
+                desired.sample_period,
+                achieved.x - desired.x,
+                achieved.y - desired.y,
+            )
+            self._curve(ERROR, error)
+            if self._lines is not None:
+                self._lines.add(desired, error)
+
+    def _curve(self, name: str, trace: Trace) -> None:
+        first = -trace.first_sample % self._step
+        samples = np.arange(trace.first_sample, end(trace), dtype=np.int64)[first :: self._step]
+        if samples.size:
+            self._screen.curve(name, samples, *(trace.axis(a)[first :: self._step] for a in "xy"))
+
+    def _resume(self, sample: int) -> None:
+        """Compare from a sample on, or from the line after it, which then is whole."""
+        self._from = sample if self._lines is None else self._lines.begins(sample)
+        self._aligner = Aligner(COMPARED)
+
+
+class ShownLines:
+    """Shows the error of each whole line: its figures, and that in x on the trace as an image."""
+
+    def __init__(self, spec: ScanSpec, screen: Screen, pixels: int) -> None:
+        self._spec, self._screen = spec, screen
+        self._where = phases(spec).lines
+        self._whole = WholeLines(self._where, spec.samples_per_line, 3)
+        self._frame = _frame(spec, pixels)
+        if self._frame is not None:
+            self._image = np.full((spec.lines, self._frame.pixels), np.nan)
+
+    def begins(self, sample: int) -> int:
+        """Return the sample, or the first one of the next line where it is within a line."""
+        if sample not in self._where:
+            return sample
+        return sample + (self._where.start - sample) % self._spec.samples_per_line
+
+    def add(self, desired: Trace, error: Trace) -> None:
+        """Take the next run of samples."""
+        rows = np.stack([desired.x, error.x, error.y])
+        for number, line in self._whole.add(desired.first_sample, rows):
+            first = self._where.start + number * self._spec.samples_per_line
+            self._screen.line("tracking_error", line_error(number, first, line[1:]))
+            if self._frame is not None:
+                self._image[number] = NANO * _trace(line[0], line[1], self._frame)
+                self._screen.image("error_x", self._image)
+
+
+def _frame(spec: ScanSpec, pixels: int) -> Frame | None:
+    """Return the pixels of a line, as many as a trace has samples for; none without lines."""
+    room = int(0.5 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
+    return frame_of(spec, min(pixels, room)) if spec.pattern in TO_AND_FRO else None
+
+
+def _trace(position: Array, values: Array, frame: Frame) -> Array:
+    to = slice(None, position.size // 2 + 1)
+    return pixel_means(position[to], values[to], frame)

@@ -1,0 +1,128 @@
+"""The process that feeds the viewer during a scan: best effort, and of low priority."""
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+from attrs import define, field
+
+from afm_scan_ros.bag.scan_info import decode_info
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.core.streams import ACHIEVED, LineError, end
+from afm_scan_ros.core.types import Trace
+from afm_scan_ros.drivers.link import Link, Message
+from afm_scan_ros.features.view import kinds
+from afm_scan_ros.features.view.blocks import ShownBlocks
+from afm_scan_ros.features.view.screen import Screen, open_screen
+from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import WINDOW, give_way, open_window
+
+SCAN_PART = "scan"
+"""Name of what is a scan in one process, in the table of states."""
+
+
+def main(descriptor: str, source: str, where: str) -> None:
+    """Show a scan until it is over or the viewer is closed."""
+    settings = ViewSettings()
+    give_way(settings)
+    link = Link(socket.socket(fileno=int(descriptor)))
+    try:
+        viewer = open_window(settings) if where == WINDOW else None
+        if source == kinds.NODES:
+            from afm_scan_ros.features.view.listening import listen  # noqa: PLC0415 - needs ROS
+
+            listen(where, settings, lambda: not _closed(viewer) and not _is_over(link))
+        else:
+            show_link(link, where, settings, lambda: not _closed(viewer))
+    except (InputError, ScanError, OSError) as error:
+        sys.exit(str(error))
+
+
+def _closed(viewer: "subprocess.Popen[bytes] | None") -> bool:
+    return viewer is not None and viewer.poll() is not None
+
+
+def _is_over(link: Link) -> bool:
+    """Return whether the scan that started this process has closed its end."""
+    try:
+        while link.readable(0.0):
+            link.receive()
+    except (EOFError, OSError):
+        return True
+    return False
+
+
+def show_link(link: Link, where: str, settings: ViewSettings, wanted: Callable[[], bool]) -> None:
+    """Show what comes over a link, as long as it is ``wanted``."""
+    shown = None
+    for messages in _batches(link, settings.refresh):
+        for message in messages:
+            if message.kind == kinds.SCAN:
+                info = decode_info(bytes.fromhex(message.fields["info"]))
+                shown = ShownPipeline(info, open_screen(info, where, settings), settings)
+            elif shown is not None:
+                shown.take(message)
+        if not wanted():
+            return
+        if shown is not None:
+            shown.screen.refresh()
+    if shown is not None:
+        shown.screen.refresh(last=True)
+
+
+def _batches(link: Link, interval: float) -> Iterator[list[Message]]:
+    """Yield what comes within each interval (s), until the link closes."""
+    try:
+        while True:
+            batch, deadline = [], time.monotonic() + interval
+            while link.readable(max(0.0, deadline - time.monotonic())):
+                batch.append(link.receive())
+                if time.monotonic() > deadline:
+                    break
+            yield batch
+    except (EOFError, OSError):
+        yield batch
+
+
+@define(eq=False)
+class ShownPipeline:
+    """A scan in one process, as its messages tell of it."""
+
+    info: ScanInfo
+    screen: Screen
+    _settings: ViewSettings
+    _blocks: ShownBlocks = field(init=False)
+    _sample: int = field(default=0, init=False)
+
+    def __attrs_post_init__(self) -> None:
+        self._blocks = ShownBlocks(self.info, self.screen, self._settings.pixels)
+
+    def take(self, message: Message) -> None:
+        """Show what a message tells."""
+        fields = message.fields
+        if message.kind == kinds.BLOCK:
+            first = fields["first_sample"]
+            block = Trace(first, self.info.sample_period, *message.samples)
+            self._blocks.add(fields["name"], block)
+            if fields["name"] == ACHIEVED:
+                self._sample = end(block)
+                self._state("running", "")
+        elif message.kind == kinds.LINE:
+            self.screen.line(fields["name"], LineError(**fields["figures"]))
+        elif message.kind == kinds.DOING:
+            self._state("ready", fields["what"])
+        elif message.kind == kinds.ENDED:
+            self._state(fields["state"], fields["reason"])
+            self.screen.say(
+                f"the scan is {fields['state']} {fields['reason']}", self._sample, "INFO"
+            )
+        elif message.kind == kinds.SAY:
+            self.screen.say(fields["text"], self._sample)
+        elif message.kind == kinds.LEFT_OUT:
+            self.screen.say(f"{fields['count']} blocks or news are {kinds.MISSING}", self._sample)
+
+    def _state(self, state: str, reason: str) -> None:
+        self.screen.state(SCAN_PART, state, self._sample, reason)

@@ -1,0 +1,39 @@
+"""How a view keeps up with a scan, and what it leaves out where it cannot."""
+
+from attrs import frozen
+
+from afm_scan_ros.core.settings import setting
+
+
+@frozen
+class ViewSettings:
+    """Times and amounts of a live view, none of which a scan waits for but ``closing``."""
+
+    queue: float = setting(
+        64e6,
+        "B",
+        "Blocks that wait for the viewer's process at most; the oldest go first",
+        "13 s of three streams at 100 kHz, four times as long as the viewer takes to start",
+    )
+    queued_news: int = setting(
+        10_000, "", "News and figures of lines that wait at most", "100 lines/s for 100 s"
+    )
+    refresh: float = setting(
+        0.05, "s", "Time between two updates of the viewer", "a tenth of the 0.5 s aimed at"
+    )
+    image_interval: float = setting(
+        0.25, "s", "Least time between two images, and two tables of states", "as of scan_imager"
+    )
+    pixels: int = setting(256, "", "Pixels in a line of the image of errors", "as of scan_imager")
+    closing: float = setting(
+        1.0,
+        "s",
+        "Longest wait of a scan, when it is over, for the viewer to show the rest",
+        "what is waiting takes 0.1 s; one that is stopped is left behind",
+    )
+    opening: float = setting(
+        20.0, "s", "Longest wait for the viewer to open", "ten times what it takes on two cores"
+    )
+    niceness: int = setting(
+        10, "", "Niceness of the viewer and of what feeds it", "that of the command nice"
+    )

@@ -1,0 +1,164 @@
+"""Opens the viewer, or a file in its place, for the scans that are to be shown."""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
+
+from attrs import frozen
+
+from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.features.view.settings import ViewSettings
+
+WINDOW = "window"
+FILE_SUFFIX = ".rrd"
+LOOPBACK = "127.0.0.1"
+PORT_VARIABLE = "AFM_SCAN_VIEW_PORT"
+"""Environment variable with the first of the viewer's three ports, by which a scan finds it."""
+USUAL_PORT, LAST_PORT = 9886, 65533
+LOOK = 0.05
+"""Seconds between two looks whether the viewer listens."""
+
+
+@frozen
+class ViewerPorts:
+    """Ports on the loopback: for scans, for the browser's data, and for its page."""
+
+    scans: int
+    data: int
+    page: int
+
+    @property
+    def address(self) -> str:
+        """Address of the page."""
+        return f"http://{LOOPBACK}:{self.page}?url=ws://{LOOPBACK}:{self.data}"
+
+    @property
+    def taken(self) -> bool:
+        """Whether a viewer waits for scans."""
+        with socket.socket() as probe:
+            return probe.connect_ex((LOOPBACK, self.scans)) == 0
+
+
+def ports() -> ViewerPorts:
+    """Return the viewer's ports; raises InputError for an environment variable that is none."""
+    given = os.environ.get(PORT_VARIABLE, str(USUAL_PORT))
+    if not given.isdecimal() or not 0 < int(given) <= LAST_PORT:
+        raise InputError(f"{PORT_VARIABLE}={given}: give a port from 1 to {LAST_PORT}")
+    first = int(given)
+    return ViewerPorts(first, first + 1, first + 2)
+
+
+def refuse_uninstalled(option: str) -> None:
+    """Raise InputError where the viewer is not installed."""
+    if find_spec("rerun") is None:
+        raise InputError(f"{option}: rerun-sdk is not installed: pip install 'afm_scan_ros[view]'")
+
+
+def refuse(where: str, option: str) -> None:
+    """Raise InputError where nothing can be shown: in the ``window``, or in a file."""
+    refuse_uninstalled(option)
+    if where != WINDOW:
+        _refuse_file(Path(where), option)
+    elif not ports().taken and not _has_display():
+        raise InputError(
+            f"{option}: there is no display to open a window on: start 'afm-scan view --serve'"
+            f" first, for a browser, or name a file to write, as scan{FILE_SUFFIX}"
+        )
+
+
+def _refuse_file(path: Path, option: str) -> None:
+    if path.suffix != FILE_SUFFIX:
+        raise InputError(f"{option} {path}: give a file that ends in {FILE_SUFFIX}")
+    if path.exists():
+        raise InputError(f"{path} exists: give the name of a new file")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"{path.parent} does not exist: make the folder, or give another file")
+
+
+def _has_display() -> bool:
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return bool(shown) or sys.platform in ("darwin", "win32")
+
+
+def give_way(settings: ViewSettings) -> None:
+    """Let this process, and the viewer that it opens, run where nothing else wants to."""
+    os.nice(settings.niceness)
+
+
+def open_window(settings: ViewSettings) -> "subprocess.Popen[bytes] | None":
+    """Open the viewer's window, which stays when this process ends; None where one is open."""
+    return None if ports().taken else _start([], settings)
+
+
+@contextmanager
+def serving(settings: ViewSettings) -> Iterator["subprocess.Popen[bytes]"]:
+    """Serve the viewer to browsers on this machine; ends with the ``with``."""
+    at = ports()
+    if at.taken:
+        raise InputError(
+            f"port {at.scans} is in use, perhaps by a viewer that is open: close it, or set"
+            f" {PORT_VARIABLE} to the first of three free ports"
+        )
+    own = ["--serve-web", "--ws-server-port", str(at.data), "--web-viewer-port", str(at.page)]
+    process = _start(own, settings)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _start(arguments: list[str], settings: ViewSettings) -> "subprocess.Popen[bytes]":
+    """Start the viewer, and wait until it listens; it sends no statistics of use to anybody."""
+    program = _program()
+    with TemporaryDirectory() as configuration, TemporaryFile() as said:
+        environment = {**os.environ, "XDG_CONFIG_HOME": configuration}
+        subprocess.run(  # noqa: S603 - the program of the package
+            [program, "analytics", "disable"],
+            check=True,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=said,
+        )
+        own = ["--bind", LOOPBACK, "--port", str(ports().scans), "--hide-welcome-screen"]
+        process = subprocess.Popen(  # noqa: S603 - as above
+            [program, *own, *arguments],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=said,
+            start_new_session=True,
+        )
+        if not _listens(process, settings.opening):
+            process.kill()
+            said.seek(0)
+            lines = said.read().decode(errors="replace").split("\n")
+            last = next((line for line in reversed(lines) if line.strip()), "it does not listen")
+            raise ScanError(f"the viewer does not open: {last}")
+    return process
+
+
+def _program() -> str:
+    """Return the viewer's own program: its script would leave it behind when it is ended."""
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        raise InputError("the package rerun_sdk has no viewer: install rerun-sdk again")
+    suffix = ".exe" if sys.platform == "win32" else ""
+    return str(Path(package.origin).with_name(f"rerun{suffix}"))
+
+
+def _listens(process: "subprocess.Popen[bytes]", longest: float) -> bool:
+    deadline = time.monotonic() + longest
+    while process.poll() is None and time.monotonic() < deadline:
+        if ports().taken:
+            return True
+        time.sleep(LOOK)
+    return False
