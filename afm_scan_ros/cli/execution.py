@@ -1,7 +1,6 @@
 """Executes what is ordered: by nodes where there is ROS, in this process elsewhere."""
 
 from collections.abc import Mapping
-from contextlib import ExitStack
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,10 @@ from typing import Any
 import click
 from attrs import evolve
 
-from afm_scan_ros.bag.live import BlockViewer, ScanListener
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.cli.viewing import VIEWS
+from afm_scan_ros.cli.viewing import viewed
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
@@ -97,14 +95,8 @@ def _scan(order: orders.ScanOrder) -> None:
         monitor=monitor,
         **_flowing(info, flow),
     )
-    listener: ScanListener
-    viewers: list[BlockViewer] = []
-    with showing(f"scan to {files.bag}") as listener, ExitStack() as open_views:
-        for name, where in order.views.items():
-            view = VIEWS[name].beside_pipeline(where, info, listener)
-            listener = seen = open_views.enter_context(view)
-            viewers.append(seen)
-        run(chain, files.bag, listener, viewers)
+    with showing(f"scan to {files.bag}") as shown, viewed(order.views, info, shown) as viewers:
+        run(chain, files.bag, viewers[-1] if viewers else shown, viewers)
 
 
 def _record(order: orders.RecordOrder) -> None:

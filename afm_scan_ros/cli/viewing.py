@@ -1,7 +1,7 @@
 """Viewers beside a scan, which features open where the option of their name says so."""
 
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Protocol
 
 from attrs import frozen
@@ -34,3 +34,16 @@ class ScanView:
 
 
 VIEWS: Mapping[str, ScanView] = features.views()
+
+
+@contextmanager
+def viewed(
+    views: Mapping[str, str], info: ScanInfo, listener: ScanListener
+) -> Iterator[Sequence[ViewingListener]]:
+    """Show a scan of this process where each viewer of a name is told to; the last hears first."""
+    found: list[ViewingListener] = []
+    with ExitStack() as open_views:
+        for name, where in views.items():
+            view = VIEWS[name].beside_pipeline(where, info, found[-1] if found else listener)
+            found.append(open_views.enter_context(view))
+        yield found

@@ -1,7 +1,6 @@
 """The process that feeds the viewer during a scan: best effort, and of low priority."""
 
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +17,7 @@ from afm_scan_ros.features.view import kinds
 from afm_scan_ros.features.view.blocks import ShownBlocks
 from afm_scan_ros.features.view.screen import Screen, open_screen
 from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW, give_way, open_window
+from afm_scan_ros.features.view.viewer import WINDOW, Viewer, give_way, open_window
 
 SCAN_PART = "scan"
 """Name of what is a scan in one process, in the table of states."""
@@ -41,7 +40,7 @@ def main(descriptor: str, source: str, where: str) -> None:
         sys.exit(str(error))
 
 
-def _closed(viewer: "subprocess.Popen[bytes] | None") -> bool:
+def _closed(viewer: Viewer) -> bool:
     return viewer is not None and viewer.poll() is not None
 
 

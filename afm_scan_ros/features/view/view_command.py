@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from subprocess import Popen
 
 import click
 
@@ -16,6 +15,7 @@ from afm_scan_ros.features.view.viewer import (
     FILE_SUFFIX,
     LOOK,
     WINDOW,
+    Viewer,
     give_way,
     open_window,
     ports,
@@ -25,8 +25,6 @@ from afm_scan_ros.features.view.viewer import (
 )
 from afm_scan_ros.pipeline import handling
 from afm_scan_ros.report.terminal import say
-
-Viewer = Popen[bytes] | None
 
 
 @click.command()

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
+from typing import TypeAlias
 
 from attrs import frozen
 
@@ -17,6 +18,8 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.view.settings import ViewSettings
 
 WINDOW = "window"
+Viewer: TypeAlias = "subprocess.Popen[bytes] | None"
+"""The process of a viewer; None where it is another's, or a file."""
 FILE_SUFFIX = ".rrd"
 LOOPBACK = "127.0.0.1"
 PORT_VARIABLE = "AFM_SCAN_VIEW_PORT"
@@ -92,7 +95,7 @@ def give_way(settings: ViewSettings) -> None:
     os.nice(settings.niceness)
 
 
-def open_window(settings: ViewSettings) -> "subprocess.Popen[bytes] | None":
+def open_window(settings: ViewSettings) -> Viewer:
     """Open the viewer's window, which stays when this process ends; None where one is open."""
     return None if ports().taken else _start([], settings)
 
