@@ -73,7 +73,7 @@ LONG = {
         "adaptation",
         "adapted_inverse",
     ),
-    "faults": ("faults", "drive", "viewers", "real_time", "soak"),
+    "faults": ("faults", "drive", "viewers", "live_view", "real_time", "soak"),
     "speed": ("speed_diagnosis",),
     "survey": ("survey",),
 }

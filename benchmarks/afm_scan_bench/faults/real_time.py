@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from afm_scan_bench.faults.injection.clocked_scanner import ClockedScanner
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import PATIENCE, Heard, Trial
-from afm_scan_bench.faults.viewers import load
+from afm_scan_bench.faults.machine import load
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.core.errors import InputError, ScanError

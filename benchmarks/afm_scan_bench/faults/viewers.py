@@ -3,7 +3,6 @@
 The viewer has ROS's own settings of DDS, the nodes those that they set themselves.
 """
 
-import os
 import shutil
 import signal
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from afm_scan_bench.faults.injection import viewer
 from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import Heard, Trial, numbered, undisturbed
+from afm_scan_bench.faults.machine import load
 from afm_scan_ros.cli.options import working
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.report.table import Row, Table
@@ -132,11 +132,6 @@ def lateness(heard: Sequence[Heard], period: float) -> float:
             done.setdefault(each.node, each)
     reports = [*running, *done.values()]
     return max(each.moment - start - each.next_sample * period for each in reports)
-
-
-def load() -> str:
-    """Describe the machine's work, since it decides what can be kept up with."""
-    return f"{os.cpu_count()} cores, load {os.getloadavg()[1]:.1f} in the last five minutes"
 
 
 def _scan(rate: int) -> Mapping[str, object]:

@@ -1,0 +1,215 @@
+"""A scan at 100 kHz in real time beside its live view, which is open, or is killed or stopped."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest import mock
+
+import numpy as np
+import rerun as rr
+from attrs import frozen
+from mcap.reader import make_reader
+
+from afm_scan_bench.faults.machine import load
+from afm_scan_ros.bag.reader import read_scan
+from afm_scan_ros.bag.scan_info import DISPLACEMENT, decode_block
+from afm_scan_ros.cli.execution import how_scans_run
+from afm_scan_ros.cli.options import working
+from afm_scan_ros.core.streams import end
+from afm_scan_ros.core.types import AXES, Array
+from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import PORT_VARIABLE, serving
+from afm_scan_ros.report.table import Row, Table
+
+TRIALS = 20
+SPEC = """\
+/**/trajectory_generator:
+  ros__parameters: {range_x_um: 10.0, range_y_um: 10.0, line_rate_hz: 20.0, lines: 50,
+    samples_per_line: 5000, preparation_cycles: 2, scan_id: one}
+"""
+STREAMS = (
+    "desired_displacement",
+    "drive_voltage",
+    "achieved_displacement",
+    "true_displacement",
+)
+EARLIEST, LATEST = 0.2, 2.5
+"""When the view falls out, s after the bag was begun."""
+PORT = 24_000
+FEEDER = "afm_scan_ros.features.view.process"
+MAIN = "from afm_scan_ros.cli.main import main; main()"
+
+COLUMNS = {
+    "view": ("view", ""),
+    "trials": ("trials", "d"),
+    "equal": ("scans whole and equal to the bit", "d"),
+    "lost": ("lost samples", "d"),
+    "longer_s": ("longer than without, s: median", ".2f"),
+    "longest_s": ("at worst", ".2f"),
+    "latency_s": ("from the sample to the view, s: median", ""),
+    "latest_s": ("at worst", ""),
+}
+FALLS_OUT: Mapping[str, tuple[bool, signal.Signals | None]] = {
+    "open": (False, None),
+    "viewer killed": (False, signal.SIGKILL),
+    "viewer stopped": (False, signal.SIGSTOP),
+    "its feeder killed": (True, signal.SIGKILL),
+    "its feeder stopped": (True, signal.SIGSTOP),
+}
+
+
+@frozen
+class Run:
+    """One scan: how long it took (s), and its samples, (streams, axes, n)."""
+
+    duration: float
+    samples: Array
+    total: int
+
+
+def measure(trials: int = TRIALS) -> Table:
+    """Scan so often without a view, with one, and with one that falls out in each way."""
+    with TemporaryDirectory() as folder, working("live_view") as announce:
+        (Path(folder) / "spec.yaml").write_text(SPEC, "utf-8")
+        plain = [_run(Path(folder), f"plain{n}") for n in range(trials)]
+        rows = [_row("none", plain, plain)]
+        rows.append(_to_a_file(Path(folder), plain, trials, announce))
+        for kind in FALLS_OUT:
+            runs = []
+            for trial in range(trials):
+                announce(f"{kind}: {trial + 1} of {trials}")
+                runs.append(_beside_viewer(Path(folder), kind, trial))
+            rows.append(_row(kind, runs, plain))
+    how = f"each scan ran {how_scans_run()}; {load()}"
+    return Table("live_view", f"The live view of a scan at 100 kHz: {how}", COLUMNS, rows)
+
+
+def _row(view: str, runs: list[Run], plain: list[Run]) -> Row:
+    usual = float(np.median([run.duration for run in plain]))
+    longer = [run.duration - usual for run in runs]
+    return {
+        "view": view,
+        "trials": len(runs),
+        "equal": sum(np.array_equal(run.samples, plain[0].samples) for run in runs),
+        "lost": sum(run.total - run.samples.shape[-1] for run in runs),
+        "longer_s": float(np.median(longer)),
+        "longest_s": max(longer),
+        "latency_s": "",
+        "latest_s": "",
+    }
+
+
+def _to_a_file(folder: Path, plain: list[Run], trials: int, announce: Callable[[str], None]) -> Row:
+    runs, latencies = [], []
+    for trial in range(trials):
+        announce(f"file: {trial + 1} of {trials}")
+        bag, shown = folder / "bag", folder / f"shown{trial}.rrd"
+        with _scanning(folder, bag, "--view", str(shown)) as scan:
+            runs.append(_ended(scan, bag, keep=True))
+        latencies.append(_latencies(bag, shown))
+        shutil.rmtree(bag)
+    every = np.concatenate(latencies)
+    found = {"latency_s": f"{np.median(every):.3f}", "latest_s": f"{every.max():.3f}"}
+    return {**_row("open, a file", runs, plain), **found}
+
+
+def _beside_viewer(folder: Path, kind: str, trial: int) -> Run:
+    """Scan beside a viewer that browsers may open, which falls out at a moment by the trial."""
+    of_feeder, number = FALLS_OUT[kind]
+    port = {PORT_VARIABLE: str(PORT)}
+    moment = float(np.random.default_rng(trial).uniform(EARLIEST, LATEST))
+    with ExitStack() as open_ends:
+        open_ends.enter_context(mock.patch.dict(os.environ, port))
+        viewer = open_ends.enter_context(serving(ViewSettings()))
+        scan = open_ends.enter_context(_scanning(folder, bag := folder / "bag", "--view"))
+        if number is not None:
+            _await_bag(bag, scan)
+            time.sleep(moment)
+            fallen = _feeder(scan.pid) if of_feeder else viewer.pid
+            os.kill(fallen, number)
+            open_ends.callback(_continue, fallen)
+        return _ended(scan, bag)
+
+
+def _continue(pid: int) -> None:
+    """Let a process go on that was stopped, so that it ends; one that was killed is gone."""
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGCONT)
+
+
+def _run(folder: Path, name: str) -> Run:
+    with _scanning(folder, folder / name) as scan:
+        return _ended(scan, folder / name)
+
+
+def _scanning(folder: Path, bag: Path, *view: str) -> "subprocess.Popen[str]":
+    own = ["--spec", str(folder / "spec.yaml"), "--time-scale", "1", "--bag", str(bag), *view]
+    return subprocess.Popen(  # noqa: S603 - our own interpreter and module
+        [sys.executable, "-c", MAIN, "scan", *own],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _ended(scan: "subprocess.Popen[str]", bag: Path, *, keep: bool = False) -> Run:
+    """Wait for a scan, which began a moment ago; return what it recorded, and remove its bag."""
+    began = _begun(scan.pid)
+    _, said = scan.communicate()
+    duration = time.monotonic() - began
+    if scan.returncode:
+        raise RuntimeError(f"the scan ended with {scan.returncode}: {said}")
+    recording = read_scan(bag)
+    traces = [recording.whole(name) for name in STREAMS]
+    samples = np.stack([[trace.axis(axis) for axis in AXES] for trace in traces])
+    total = recording.info.total_samples
+    if not keep:
+        shutil.rmtree(bag)
+    return Run(duration, samples, total)
+
+
+def _begun(pid: int) -> float:
+    """Return when a process was started, on the monotonic clock (s)."""
+    after_boot = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[19]
+    return int(after_boot) / os.sysconf("SC_CLK_TCK")
+
+
+def _await_bag(bag: Path, scan: "subprocess.Popen[str]") -> None:
+    while not bag.exists() and scan.poll() is None:
+        time.sleep(0.01)
+
+
+def _feeder(parent: int) -> int:
+    """Return the process that feeds the viewer, of those that a scan has started."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            own = stat.read_text("utf-8").rpartition(")")[2].split()[1]
+            if int(own) == parent and FEEDER in (stat.parent / "cmdline").read_text("utf-8"):
+                return int(stat.parent.name)
+    raise RuntimeError("the scan has no process that feeds the viewer")
+
+
+def _latencies(bag: Path, shown: Path) -> Array:
+    """Return how long (s) after each sample of the curve the viewer was given it.
+
+    The scan ran in real time, and a block is recorded no sooner than its last sample is achieved.
+    """
+    (file,) = bag.glob("*.mcap")
+    period, starts = read_scan(bag).info.sample_period, []
+    with file.open("rb") as stream:
+        for _, _, message in make_reader(stream).iter_messages(topics=["/achieved_displacement"]):
+            stop = end(decode_block(DISPLACEMENT, message.data).trace)
+            starts.append(1e-9 * message.log_time - stop * period)
+    path = "/displacement/achieved/x"
+    view = rr.dataframe.load_recording(shown).view(index="scan_time", contents=path)
+    table = view.select("scan_time", "wall_clock").read_all()
+    sample, given = (table[i].cast("int64").to_numpy() * 1e-9 for i in range(2))
+    latencies: Array = given - sample - min(starts)
+    return latencies
