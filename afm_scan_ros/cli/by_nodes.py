@@ -21,7 +21,7 @@ from afm_scan_ros.cli.orders import (
 )
 from afm_scan_ros.cli.processes import PATIENCE, NodeCommand, isolate, run_nodes
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.cli.viewing import VIEWS
+from afm_scan_ros.cli.views import VIEWS
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec

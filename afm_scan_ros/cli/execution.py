@@ -11,7 +11,7 @@ from attrs import evolve
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.cli.viewing import viewed
+from afm_scan_ros.cli.views import viewed
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion

@@ -31,7 +31,7 @@ from afm_scan_ros.cli.scanner import (
     scanner_options,
     time_scale_option,
 )
-from afm_scan_ros.cli.viewing import VIEWS
+from afm_scan_ros.cli.views import VIEWS
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits

@@ -1,12 +1,11 @@
-"""Viewers beside a scan, which features open where the option of their name says so."""
+"""What a viewer is that a feature opens beside a scan, where the option of its name says so."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Protocol
 
 from attrs import frozen
 
-from afm_scan_ros import features
 from afm_scan_ros.bag.live import BlockViewer, ScanListener
 from afm_scan_ros.core.scan_info import ScanInfo
 
@@ -31,19 +30,3 @@ class ScanView:
         [str, ScanInfo, ScanListener], AbstractContextManager[ViewingListener]
     ]
     beside_nodes: Callable[[str, ScanListener], AbstractContextManager[None]]
-
-
-VIEWS: Mapping[str, ScanView] = features.views()
-
-
-@contextmanager
-def viewed(
-    views: Mapping[str, str], info: ScanInfo, listener: ScanListener
-) -> Iterator[Sequence[ViewingListener]]:
-    """Show a scan of this process where each viewer of a name is told to; the last hears first."""
-    found: list[ViewingListener] = []
-    with ExitStack() as open_views:
-        for name, where in views.items():
-            view = VIEWS[name].beside_pipeline(where, info, found[-1] if found else listener)
-            found.append(open_views.enter_context(view))
-        yield found

@@ -24,7 +24,11 @@ from afm_scan_ros.features.view.handover import Handover
 from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import WINDOW, refuse
 
-_RUN = "import sys; from afm_scan_ros.features.view.process import main; main(*sys.argv[1:])"
+_RUN = (
+    "import os, sys; os.nice(int(sys.argv[1]));"
+    " from afm_scan_ros.features.view.process import main; main(*sys.argv[2:])"
+)
+"""It gives way before it imports anything."""
 
 
 @frozen(eq=False)
@@ -89,8 +93,9 @@ def _viewing(
     ours, theirs = socket.socketpair()
     with ours, TemporaryFile("w+", encoding="utf-8") as output:
         with theirs:
+            own = [str(settings.niceness), str(theirs.fileno()), source, where]
             process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-P", "-c", _RUN, str(theirs.fileno()), source, where],
+                [sys.executable, "-P", "-c", _RUN, *own],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,

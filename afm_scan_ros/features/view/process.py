@@ -17,7 +17,7 @@ from afm_scan_ros.features.view import kinds
 from afm_scan_ros.features.view.blocks import ShownBlocks
 from afm_scan_ros.features.view.screen import Screen, open_screen
 from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW, Viewer, give_way, open_window
+from afm_scan_ros.features.view.viewer import WINDOW, Viewer, open_window
 
 SCAN_PART = "scan"
 """Name of what is a scan in one process, in the table of states."""
@@ -26,7 +26,6 @@ SCAN_PART = "scan"
 def main(descriptor: str, source: str, where: str) -> None:
     """Show a scan until it is over or the viewer is closed."""
     settings = ViewSettings()
-    give_way(settings)
     link = Link(socket.socket(fileno=int(descriptor)))
     try:
         viewer = open_window(settings) if where == WINDOW else None

@@ -1,5 +1,6 @@
 """``afm-scan view``: shows a running scan, or a bag, in a window, a browser or a file."""
 
+import os
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -16,7 +17,6 @@ from afm_scan_ros.features.view.viewer import (
     LOOK,
     WINDOW,
     Viewer,
-    give_way,
     open_window,
     ports,
     refuse,
@@ -45,7 +45,7 @@ def view(bag: Path | None, save: str | None, *, serve: bool) -> None:
             f"--save: no nodes can be heard without ROS 2: name a bag, or scan with --view {save}"
         )
     settings, interrupted = ViewSettings(), []
-    give_way(settings)
+    os.nice(settings.niceness)
     with ExitStack() as open_ends:
         open_ends.enter_context(handling(lambda number, _: interrupted.append(number)))
         viewer = _opened(open_ends, settings, save, serve=serve)

@@ -90,11 +90,6 @@ def _has_display() -> bool:
     return bool(shown) or sys.platform in ("darwin", "win32")
 
 
-def give_way(settings: ViewSettings) -> None:
-    """Let this process, and the viewer that it opens, run where nothing else wants to."""
-    os.nice(settings.niceness)
-
-
 def open_window(settings: ViewSettings) -> Viewer:
     """Open the viewer's window, which stays when this process ends; None where one is open."""
     return None if ports().taken else _start([], settings)
