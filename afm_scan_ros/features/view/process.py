@@ -114,9 +114,9 @@ class ShownPipeline:
             self._state("ready", fields["what"])
         elif message.kind == kinds.ENDED:
             self._state(fields["state"], fields["reason"])
-            self.screen.say(
-                f"the scan is {fields['state']} {fields['reason']}", self._sample, "INFO"
-            )
+            why = fields["reason"]
+            ended = f"the scan has failed: {why}" if why else "the scan is done"
+            self.screen.say(ended, self._sample, "WARN" if why else "INFO")
         elif message.kind == kinds.SAY:
             self.screen.say(fields["text"], self._sample)
         elif message.kind == kinds.LEFT_OUT:
