@@ -13,6 +13,7 @@ from afm_scan_ros.core.extension import ExtensionSettings
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.intersample import IntersampleSettings
 from afm_scan_ros.drivers.safety import SafetySettings
+from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.report.drawing_settings import DrawingSettings
 
 SETTINGS: tuple[type, ...] = (
@@ -24,6 +25,7 @@ SETTINGS: tuple[type, ...] = (
     StructureSettings,
     ExtensionSettings,
     DrawingSettings,
+    ViewSettings,
 )
 
 INTRODUCTION = """\

@@ -80,7 +80,7 @@ def test_the_plant_shares_no_physics_with_the_model() -> None:
         assert core <= SIMULATION_MAY, path.name
 
 
-NEED_ROS = {"cli/by_nodes.py", "cli/listening.py"}
+NEED_ROS = {"cli/by_nodes.py", "cli/listening.py", "features/view/listening.py"}
 """Modules beside the nodes that are imported only where ROS is."""
 
 

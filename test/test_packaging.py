@@ -86,7 +86,7 @@ def test_the_documents_say_why_of_every_dependency() -> None:
 
 
 def test_every_import_is_declared() -> None:
-    extras = {"distributed", "nidaqmx", "pyarrow"}
+    extras = {"distributed", "nidaqmx", "pyarrow", "rerun"}
     extras |= {"NSFopen", "gsffile", "gwyfile", "h5netcdf", "igor2", "pySPM"}
     declared = {*ROSDEP, *extras, "yaml", "afm_scan_ros", "lz4", "zstandard", "PIL"}  # matplotlib's
     declared.add("markupsafe")  # jinja2's

@@ -11,12 +11,12 @@ class ViewSettings:
 
     queue: float = setting(
         64e6,
-        "B",
+        "byte",
         "Blocks that wait for the viewer's process at most; the oldest go first",
         "13 s of three streams at 100 kHz, four times as long as the viewer takes to start",
     )
     queued_news: int = setting(
-        10_000, "", "News and figures of lines that wait at most", "100 lines/s for 100 s"
+        10_000, "1", "News and figures of lines that wait at most", "100 lines/s for 100 s"
     )
     refresh: float = setting(
         0.05, "s", "Time between two updates of the viewer", "a tenth of the 0.5 s aimed at"
@@ -24,7 +24,7 @@ class ViewSettings:
     image_interval: float = setting(
         0.25, "s", "Least time between two images, and two tables of states", "as of scan_imager"
     )
-    pixels: int = setting(256, "", "Pixels in a line of the image of errors", "as of scan_imager")
+    pixels: int = setting(256, "1", "Pixels in a line of the image of errors", "as of scan_imager")
     closing: float = setting(
         1.0,
         "s",
@@ -34,6 +34,12 @@ class ViewSettings:
     opening: float = setting(
         20.0, "s", "Longest wait for the viewer to open", "ten times what it takes on two cores"
     )
+    port: int = setting(
+        9886,
+        "1",
+        "First of three ports on the loopback",
+        "ten above Rerun's own, so that both can be open",
+    )
     niceness: int = setting(
-        10, "", "Niceness of the viewer and of what feeds it", "that of the command nice"
+        10, "1", "Niceness of the viewer and of what feeds it", "that of the command nice"
     )

@@ -14,7 +14,6 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import (
     FILE_SUFFIX,
-    LOOK,
     WINDOW,
     Viewer,
     open_window,
@@ -62,7 +61,7 @@ def view(bag: Path | None, save: str | None, *, serve: bool) -> None:
         else:
             say("Scans with 'afm-scan scan --view' are shown here.")
         while serve and wanted():
-            time.sleep(LOOK)
+            time.sleep(settings.refresh)
 
 
 def _refuse(save: str | None, *, serve: bool) -> None:

@@ -24,9 +24,6 @@ FILE_SUFFIX = ".rrd"
 LOOPBACK = "127.0.0.1"
 PORT_VARIABLE = "AFM_SCAN_VIEW_PORT"
 """Environment variable with the first of the viewer's three ports, by which a scan finds it."""
-USUAL_PORT, LAST_PORT = 9886, 65533
-LOOK = 0.05
-"""Seconds between two looks whether the viewer listens."""
 
 
 @frozen
@@ -51,9 +48,9 @@ class ViewerPorts:
 
 def ports() -> ViewerPorts:
     """Return the viewer's ports; raises InputError for an environment variable that is none."""
-    given = os.environ.get(PORT_VARIABLE, str(USUAL_PORT))
-    if not given.isdecimal() or not 0 < int(given) <= LAST_PORT:
-        raise InputError(f"{PORT_VARIABLE}={given}: give a port from 1 to {LAST_PORT}")
+    given, last = os.environ.get(PORT_VARIABLE, str(ViewSettings().port)), 2**16 - 3
+    if not given.isdecimal() or not 0 < int(given) <= last:
+        raise InputError(f"{PORT_VARIABLE}={given}: give a port from 1 to {last}")
     first = int(given)
     return ViewerPorts(first, first + 1, first + 2)
 
@@ -135,7 +132,7 @@ def _start(arguments: list[str], settings: ViewSettings) -> "subprocess.Popen[by
             stderr=said,
             start_new_session=True,
         )
-        if not _listens(process, settings.opening):
+        if not _listens(process, settings):
             process.kill()
             said.seek(0)
             lines = said.read().decode(errors="replace").split("\n")
@@ -153,10 +150,10 @@ def _program() -> str:
     return str(Path(package.origin).with_name(f"rerun{suffix}"))
 
 
-def _listens(process: "subprocess.Popen[bytes]", longest: float) -> bool:
-    deadline = time.monotonic() + longest
+def _listens(process: "subprocess.Popen[bytes]", settings: ViewSettings) -> bool:
+    deadline = time.monotonic() + settings.opening
     while process.poll() is None and time.monotonic() < deadline:
         if ports().taken:
             return True
-        time.sleep(LOOK)
+        time.sleep(settings.refresh)
     return False
