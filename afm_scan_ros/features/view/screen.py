@@ -29,8 +29,8 @@ class Panel:
 
     folder: str
     title: str
-    scale: float
     curves: Mapping[str, str]
+    scale: float = 1.0
 
 
 DARK, LIGHT = (BLUE, ORANGE), (LIGHT_BLUE, LIGHT_ORANGE)
@@ -42,13 +42,13 @@ OF_LINES = {
 OF_AXES = dict(zip(AXES, DARK, strict=True))
 PANELS = {
     DESIRED: Panel(
-        "displacement/desired", "Displacement, µm", MICRO, dict(zip(AXES, LIGHT, strict=True))
+        "displacement/desired", "Displacement, µm", dict(zip(AXES, LIGHT, strict=True)), MICRO
     ),
-    ACHIEVED: Panel("displacement/achieved", "Displacement, µm", MICRO, OF_AXES),
-    ERROR: Panel("error", "Error (achieved - desired), nm", NANO, OF_AXES),
-    DRIVE: Panel("drive", "Drive, V", 1.0, OF_AXES),
-    "tracking_error": Panel("lines/error", "Error of each line, nm", NANO, OF_LINES),
-    "model_residual": Panel("lines/residual", "Residual of each line, nm", NANO, OF_LINES),
+    ACHIEVED: Panel("displacement/achieved", "Displacement, µm", OF_AXES, MICRO),
+    ERROR: Panel("error", "Error (achieved - desired), nm", OF_AXES, NANO),
+    DRIVE: Panel("drive", "Drive, V", OF_AXES),
+    "tracking_error": Panel("lines/error", "Error of each line, nm", OF_LINES, NANO),
+    "model_residual": Panel("lines/residual", "Residual of each line, nm", OF_LINES, NANO),
 }
 Whole: TypeAlias = NDArray[np.int64]
 Rows: TypeAlias = tuple[Whole, Array]
@@ -182,7 +182,7 @@ def open_screen(info: ScanInfo, where: str, settings: ViewSettings) -> Screen:
     stream = rr.new_recording("afm_scan", recording_id=info.scan_id)
     if where == WINDOW:
         address = f"{LOOPBACK}:{ports().scans}"
-        rr.connect_tcp(address, flush_timeout_sec=None, recording=stream)
+        rr.connect_tcp(address, flush_timeout_sec=settings.giving_up, recording=stream)
     else:
         rr.save(where, recording=stream)
         settings = evolve(settings, image_interval=inf)

@@ -31,6 +31,12 @@ class ViewSettings:
         "Longest wait of a scan, when it is over, for the viewer to show the rest",
         "what is waiting takes 0.1 s; one that is stopped is left behind",
     )
+    giving_up: float = setting(
+        2.0,
+        "s",
+        "Longest try to reach a viewer that is gone",
+        "twice closing; data are dropped then",
+    )
     opening: float = setting(
         20.0, "s", "Longest wait for the viewer to open", "ten times what it takes on two cores"
     )
