@@ -8,13 +8,14 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest import mock
 
 import numpy as np
 import rerun as rr
-from attrs import frozen
+from attrs import evolve, field, frozen
 from mcap.reader import make_reader
 
 from afm_scan_bench.faults.machine import load
@@ -29,6 +30,9 @@ from afm_scan_ros.features.view.viewer import PORT_VARIABLE, serving
 from afm_scan_ros.report.table import Row, Table
 
 TRIALS = 20
+PLAIN, TO_A_FILE = "none", "open, a file"
+MOST = 0.99
+"""Share of the samples whose latency is given beside the median."""
 SPEC = """\
 /**/trajectory_generator:
   ros__parameters: {range_x_um: 10.0, range_y_um: 10.0, line_rate_hz: 20.0, lines: 50,
@@ -54,6 +58,7 @@ COLUMNS = {
     "longer_s": ("longer than without, s: median", ".2f"),
     "longest_s": ("at worst", ".2f"),
     "latency_s": ("from the sample to the view, s: median", ""),
+    "most_s": (f"{MOST:.0%} within", ""),
     "latest_s": ("at worst", ""),
 }
 FALLS_OUT: Mapping[str, tuple[bool, signal.Signals | None]] = {
@@ -67,33 +72,40 @@ FALLS_OUT: Mapping[str, tuple[bool, signal.Signals | None]] = {
 
 @frozen
 class Run:
-    """One scan: how long it took (s), and its samples, (streams, axes, n)."""
+    """One scan: how long it took (s), its samples, (streams, axes, n), and how late they were seen.
+
+    ``latencies`` (s) are those of the samples of a curve, where they are known.
+    """
 
     duration: float
     samples: Array
     total: int
+    latencies: Array = field(factory=lambda: np.empty(0))
 
 
 def measure(trials: int = TRIALS) -> Table:
     """Scan so often without a view, with one, and with one that falls out in each way."""
+    scans: dict[str, Callable[[Path, int], Run]] = {
+        PLAIN: _plain,
+        TO_A_FILE: _to_a_file,
+        **{kind: partial(_beside_viewer, kind) for kind in FALLS_OUT},
+    }
+    runs: dict[str, list[Run]] = {kind: [] for kind in scans}
     with TemporaryDirectory() as folder, working("live_view") as announce:
         (Path(folder) / "spec.yaml").write_text(SPEC, "utf-8")
-        plain = [_run(Path(folder), f"plain{n}") for n in range(trials)]
-        rows = [_row("none", plain, plain)]
-        rows.append(_to_a_file(Path(folder), plain, trials, announce))
-        for kind in FALLS_OUT:
-            runs = []
-            for trial in range(trials):
-                announce(f"{kind}: {trial + 1} of {trials}")
-                runs.append(_beside_viewer(Path(folder), kind, trial))
-            rows.append(_row(kind, runs, plain))
+        for trial in range(trials):
+            for kind, scan in scans.items():
+                announce(f"{trial + 1} of {trials}, {kind}")
+                runs[kind].append(scan(Path(folder), trial))
+    rows = [_row(kind, found, runs[PLAIN]) for kind, found in runs.items()]
     how = f"each scan ran {how_scans_run()}; {load()}"
     return Table("live_view", f"The live view of a scan at 100 kHz: {how}", COLUMNS, rows)
 
 
 def _row(view: str, runs: list[Run], plain: list[Run]) -> Row:
-    usual = float(np.median([run.duration for run in plain]))
-    longer = [run.duration - usual for run in runs]
+    """Compare scans with those without a view, each with the one that was made next to it."""
+    longer = [run.duration - other.duration for run, other in zip(runs, plain, strict=True)]
+    late = np.concatenate([run.latencies for run in runs])
     return {
         "view": view,
         "trials": len(runs),
@@ -101,26 +113,29 @@ def _row(view: str, runs: list[Run], plain: list[Run]) -> Row:
         "lost": sum(run.total - run.samples.shape[-1] for run in runs),
         "longer_s": float(np.median(longer)),
         "longest_s": max(longer),
-        "latency_s": "",
-        "latest_s": "",
+        "latency_s": f"{np.median(late):.3f}" if late.size else "",
+        "most_s": f"{np.quantile(late, MOST):.3f}" if late.size else "",
+        "latest_s": f"{late.max():.3f}" if late.size else "",
     }
 
 
-def _to_a_file(folder: Path, plain: list[Run], trials: int, announce: Callable[[str], None]) -> Row:
-    runs, latencies = [], []
-    for trial in range(trials):
-        announce(f"file: {trial + 1} of {trials}")
-        bag, shown = folder / "bag", folder / f"shown{trial}.rrd"
-        with _scanning(folder, bag, "--view", str(shown)) as scan:
-            runs.append(_ended(scan, bag, keep=True))
-        latencies.append(_latencies(bag, shown))
-        shutil.rmtree(bag)
-    every = np.concatenate(latencies)
-    found = {"latency_s": f"{np.median(every):.3f}", "latest_s": f"{every.max():.3f}"}
-    return {**_row("open, a file", runs, plain), **found}
+def _plain(folder: Path, _: int) -> Run:
+    with _scanning(folder, bag := folder / "bag") as scan:
+        found = _ended(scan, bag)
+    shutil.rmtree(bag)
+    return found
 
 
-def _beside_viewer(folder: Path, kind: str, trial: int) -> Run:
+def _to_a_file(folder: Path, trial: int) -> Run:
+    bag, shown = folder / "bag", folder / f"shown{trial}.rrd"
+    with _scanning(folder, bag, "--view", str(shown)) as scan:
+        found = _ended(scan, bag)
+    latencies = _latencies(bag, shown)
+    shutil.rmtree(bag)
+    return evolve(found, latencies=latencies)
+
+
+def _beside_viewer(kind: str, folder: Path, trial: int) -> Run:
     """Scan beside a viewer that browsers may open, which falls out at a moment by the trial."""
     of_feeder, number = FALLS_OUT[kind]
     port = {PORT_VARIABLE: str(PORT)}
@@ -135,18 +150,15 @@ def _beside_viewer(folder: Path, kind: str, trial: int) -> Run:
             fallen = _feeder(scan.pid) if of_feeder else viewer.pid
             os.kill(fallen, number)
             open_ends.callback(_continue, fallen)
-        return _ended(scan, bag)
+        found = _ended(scan, bag)
+        shutil.rmtree(bag)
+        return found
 
 
 def _continue(pid: int) -> None:
     """Let a process go on that was stopped, so that it ends; one that was killed is gone."""
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGCONT)
-
-
-def _run(folder: Path, name: str) -> Run:
-    with _scanning(folder, folder / name) as scan:
-        return _ended(scan, folder / name)
 
 
 def _scanning(folder: Path, bag: Path, *view: str) -> "subprocess.Popen[str]":
@@ -159,8 +171,8 @@ def _scanning(folder: Path, bag: Path, *view: str) -> "subprocess.Popen[str]":
     )
 
 
-def _ended(scan: "subprocess.Popen[str]", bag: Path, *, keep: bool = False) -> Run:
-    """Wait for a scan, which began a moment ago; return what it recorded, and remove its bag."""
+def _ended(scan: "subprocess.Popen[str]", bag: Path) -> Run:
+    """Wait for a scan, which began a moment ago; return what it recorded."""
     began = _begun(scan.pid)
     _, said = scan.communicate()
     duration = time.monotonic() - began
@@ -169,10 +181,7 @@ def _ended(scan: "subprocess.Popen[str]", bag: Path, *, keep: bool = False) -> R
     recording = read_scan(bag)
     traces = [recording.whole(name) for name in STREAMS]
     samples = np.stack([[trace.axis(axis) for axis in AXES] for trace in traces])
-    total = recording.info.total_samples
-    if not keep:
-        shutil.rmtree(bag)
-    return Run(duration, samples, total)
+    return Run(duration, samples, recording.info.total_samples)
 
 
 def _begun(pid: int) -> float:
