@@ -55,23 +55,24 @@ def _hear(executor: SingleThreadedExecutor, longest: float) -> None:
 
 
 def _subscribe(node: Node, shown: "ShownNodes") -> None:
-    """Read last words reliably, of which a node keeps one, and all else best effort."""
-    for topic, hear in ((topics.SCAN_INFO, shown.meet), (topics.NODE_STATE, shown.state)):
-        node.create_subscription(topic.kind, topic.name, hear, topic.reader)
-    lines = {
-        topic: partial(shown.line, topic.name)
-        for topic in (topics.TRACKING_ERROR, topics.MODEL_RESIDUAL)
+    """Read the announcement reliably, of which there is one, and all else best effort."""
+    hearing: dict[NodeTopic, Callable[[Message], None]] = {
+        topics.MONITOR: shown.sample,
+        topics.NODE_STATE: shown.state,
+        topics.TRACKING_ERROR: partial(shown.line, topics.TRACKING_ERROR.name),
+        topics.MODEL_RESIDUAL: partial(shown.line, topics.MODEL_RESIDUAL.name),
+        topics.TRACE_IMAGE: partial(shown.image, IMAGE_TOPICS[topics.TRACE_IMAGE.name]),
+        topics.RETRACE_IMAGE: partial(shown.image, IMAGE_TOPICS[topics.RETRACE_IMAGE.name]),
     }
-    images = {
-        topic: partial(shown.image, IMAGE_TOPICS[topic.name])
-        for topic in (topics.TRACE_IMAGE, topics.RETRACE_IMAGE)
-    }
-    for topic, hear in ({topics.MONITOR: shown.sample} | lines | images).items():
+    announced = topics.SCAN_INFO
+    node.create_subscription(announced.kind, announced.name, shown.meet, announced.reader)
+    for topic, hear in hearing.items():
         node.create_subscription(topic.kind, topic.name, hear, _best_effort(topic))
 
 
 def _best_effort(topic: NodeTopic) -> QoSProfile:
-    return QoSProfile(depth=topic.writer.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    depth = max(topic.writer.depth, topic.reader.depth)
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 @define(eq=False)

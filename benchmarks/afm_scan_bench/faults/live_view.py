@@ -60,6 +60,7 @@ COLUMNS = {
     "latency_s": ("from the sample to the view, s: median", ""),
     "most_s": (f"{MOST:.0%} within", ""),
     "latest_s": ("at worst", ""),
+    "trouble": ("what was wrong", ""),
 }
 FALLS_OUT: Mapping[str, tuple[bool, signal.Signals | None]] = {
     "open": (False, None),
@@ -81,6 +82,7 @@ class Run:
     samples: Array
     total: int
     latencies: Array = field(factory=lambda: np.empty(0))
+    trouble: str = ""
 
 
 def measure(trials: int = TRIALS) -> Table:
@@ -106,23 +108,25 @@ def _row(view: str, runs: list[Run], plain: list[Run]) -> Row:
     """Compare scans with those without a view, each with the one that was made next to it."""
     longer = [run.duration - other.duration for run, other in zip(runs, plain, strict=True)]
     late = np.concatenate([run.latencies for run in runs])
+    whole = next((run.samples for run in plain if not run.trouble), np.empty(0))
     return {
         "view": view,
         "trials": len(runs),
-        "equal": sum(np.array_equal(run.samples, plain[0].samples) for run in runs),
-        "lost": sum(run.total - run.samples.shape[-1] for run in runs),
+        "equal": sum(not run.trouble and np.array_equal(run.samples, whole) for run in runs),
+        "lost": sum(run.total - run.samples.shape[-1] for run in runs if not run.trouble),
         "longer_s": float(np.median(longer)),
         "longest_s": max(longer),
         "latency_s": f"{np.median(late):.3f}" if late.size else "",
         "most_s": f"{np.quantile(late, MOST):.3f}" if late.size else "",
         "latest_s": f"{late.max():.3f}" if late.size else "",
+        "trouble": "; ".join(run.trouble for run in runs if run.trouble),
     }
 
 
 def _plain(folder: Path, _: int) -> Run:
     with _scanning(folder, bag := folder / "bag") as scan:
         found = _ended(scan, bag)
-    shutil.rmtree(bag)
+    shutil.rmtree(bag, ignore_errors=True)
     return found
 
 
@@ -130,6 +134,8 @@ def _to_a_file(folder: Path, trial: int) -> Run:
     bag, shown = folder / "bag", folder / f"shown{trial}.rrd"
     with _scanning(folder, bag, "--view", str(shown)) as scan:
         found = _ended(scan, bag)
+    if found.trouble:
+        return found
     latencies = _latencies(bag, shown)
     shutil.rmtree(bag)
     return evolve(found, latencies=latencies)
@@ -151,7 +157,7 @@ def _beside_viewer(kind: str, folder: Path, trial: int) -> Run:
             os.kill(fallen, number)
             open_ends.callback(_continue, fallen)
         found = _ended(scan, bag)
-        shutil.rmtree(bag)
+        shutil.rmtree(bag, ignore_errors=True)
         return found
 
 
@@ -177,7 +183,7 @@ def _ended(scan: "subprocess.Popen[str]", bag: Path) -> Run:
     _, said = scan.communicate()
     duration = time.monotonic() - began
     if scan.returncode:
-        raise RuntimeError(f"the scan ended with {scan.returncode}: {said}")
+        return Run(duration, np.empty(0), 0, trouble=said.strip().splitlines()[-1])
     recording = read_scan(bag)
     traces = [recording.whole(name) for name in STREAMS]
     samples = np.stack([[trace.axis(axis) for axis in AXES] for trace in traces])
