@@ -75,3 +75,14 @@ def news(file: Path) -> list[str]:
 
     view = rr.dataframe.load_recording(file).view(index="log_time", contents="/news")
     return [text[0] for text in view.select("/news:Text").read_all()[0].to_pylist() if text]
+
+
+def states(file: Path) -> str:
+    """Return the table of states in a file of the viewer, as it was last."""
+    import rerun as rr  # noqa: PLC0415 - need not be installed
+
+    view = rr.dataframe.load_recording(file).view(
+        index="scan_time", contents="/states", include_semantically_empty_columns=True
+    )
+    text: str = view.select_static("/states:Text").read_all()[0].to_pylist()[0][0]
+    return text

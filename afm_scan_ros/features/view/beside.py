@@ -1,11 +1,12 @@
 """Opens a view beside a scan: a process of its own, which gets blocks or listens to nodes."""
 
+import os
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from tempfile import TemporaryFile
 
@@ -21,14 +22,11 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.link import Message
 from afm_scan_ros.features.view import kinds
 from afm_scan_ros.features.view.handover import Handover
+from afm_scan_ros.features.view.priority import run_after
 from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import WINDOW, refuse
 
-_RUN = (
-    "import os, sys; os.nice(int(sys.argv[1]));"
-    " from afm_scan_ros.features.view.process import main; main(*sys.argv[2:])"
-)
-"""It gives way before it imports anything."""
+_RUN = "from afm_scan_ros.features.view.process import main; main(*sys.argv[1:])"
 
 
 @frozen(eq=False)
@@ -89,13 +87,13 @@ def beside_nodes(settings: ViewSettings, where: str, listener: ScanListener) -> 
 def _viewing(
     source: str, where: str, settings: ViewSettings, listener: ScanListener
 ) -> Iterator[Handover]:
-    """Run the viewer's process; at the end it has ``closing`` to show the rest."""
+    """Run the viewer's process; at the end it has a moment to show the rest."""
     ours, theirs = socket.socketpair()
     with ours, TemporaryFile("w+", encoding="utf-8") as output:
         with theirs:
-            own = [str(settings.niceness), str(theirs.fileno()), source, where]
+            code = run_after(settings.niceness, _RUN)
             process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-P", "-c", _RUN, *own],
+                [sys.executable, "-P", "-c", code, str(theirs.fileno()), source, where],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
@@ -106,13 +104,29 @@ def _viewing(
         try:
             yield handover
         finally:
-            deadline = time.monotonic() + settings.closing
-            handover.close(settings.closing)
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(max(0.0, deadline - time.monotonic()))
+            handover.finish()
+            if left := _left(process, where, settings):
+                listener.say(f"--view: {left}")
+            handover.close()
             output.seek(0)
             if process.returncode and (said := output.read().strip()):
                 listener.say(f"--view: {said.splitlines()[-1]}")
+
+
+def _left(process: "subprocess.Popen[bytes]", where: str, settings: ViewSettings) -> str:
+    """Let the viewer show the rest, for a while; say where it has not."""
+    waits = settings.closing if where == WINDOW else settings.finishing
+    deadline, patience = (time.monotonic() + wait for wait in (waits, settings.closing))
+    while process.poll() is None:
+        now = time.monotonic()
+        if now > deadline or (now > patience and _is_stopped(process.pid)):
+            return "the viewer is behind, and the scan did not wait for it"
+        time.sleep(settings.refresh)
+    return ""
+
+
+def _is_stopped(child: int) -> bool:
+    return os.waitid(os.P_PID, child, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 _SETTINGS = ViewSettings()

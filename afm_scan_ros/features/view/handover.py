@@ -2,6 +2,7 @@
 
 import socket
 from collections import deque
+from contextlib import suppress
 from threading import Condition, Thread
 
 from afm_scan_ros.drivers.link import Link, Message
@@ -23,8 +24,7 @@ class Handover:
         self._waiting, self._left_out = 0, 0
         self._over = False
         self._changed = Condition()
-        self._thread = Thread(target=self._send, daemon=True)
-        self._thread.start()
+        Thread(target=self._send, daemon=True).start()
 
     def block(self, message: Message) -> None:
         """Hand over a block of samples."""
@@ -43,18 +43,22 @@ class Handover:
             self._news.append(message)
             self._changed.notify()
 
-    def close(self, longest: float) -> None:
-        """Send what waits, for so long (s) at most, and close."""
+    def finish(self) -> None:
+        """Send what waits, and then the end."""
         with self._changed:
             self._over = True
             self._changed.notify()
-        self._thread.join(longest)
-        self._socket.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Send no more."""
+        with suppress(OSError):  # the viewer's process is gone
+            self._socket.shutdown(socket.SHUT_RDWR)
 
     def _send(self) -> None:
         try:
             while message := self._next():
                 self._link.send(message)
+            self._socket.shutdown(socket.SHUT_WR)
         except OSError:  # the viewer's process is gone
             self._room = 0.0
 

@@ -31,6 +31,12 @@ class ViewSettings:
         "Longest wait of a scan, when it is over, for the viewer to show the rest",
         "what is waiting takes 0.1 s; one that is stopped is left behind",
     )
+    finishing: float = setting(
+        60.0,
+        "s",
+        "As closing, where a file is written by a process that is not stopped",
+        "nothing moves any more; on two cores with ten busy processes it takes half of that",
+    )
     giving_up: float = setting(
         2.0,
         "s",
@@ -47,5 +53,8 @@ class ViewSettings:
         "ten above Rerun's own, so that both can be open",
     )
     niceness: int = setting(
-        10, "1", "Niceness of the viewer and of what feeds it", "that of the command nice"
+        5,
+        "1",
+        "Niceness of the viewer and of what feeds it, and of their sessions",
+        "a third of a scan's share of a core; at 10 a busy machine leaves nothing for them",
     )

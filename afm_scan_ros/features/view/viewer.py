@@ -15,6 +15,7 @@ from typing import TypeAlias
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.features.view.priority import run_after
 from afm_scan_ros.features.view.settings import ViewSettings
 
 WINDOW = "window"
@@ -124,8 +125,9 @@ def _start(arguments: list[str], settings: ViewSettings) -> "subprocess.Popen[by
             stderr=said,
         )
         own = ["--bind", LOOPBACK, "--port", str(ports().scans), "--hide-welcome-screen"]
+        code = run_after(settings.niceness, "os.execv(sys.argv[1], sys.argv[1:])")
         process = subprocess.Popen(  # noqa: S603 - as above
-            [program, *own, *arguments],
+            [sys.executable, "-P", "-c", code, program, *own, *arguments],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=said,

@@ -10,6 +10,7 @@ import pytest
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.streams import monitor_step
+from afm_scan_ros.features.view.settings import ViewSettings
 from helpers.viewed import command, curve, feeder_of, let_go_on, news, recorded
 
 pytest.importorskip("rerun", reason="the viewer is not installed: pip install 'afm_scan_ros[view]'")
@@ -19,7 +20,7 @@ SPEC = """\
   ros__parameters: {range_x_um: 10.0, range_y_um: 10.0, line_rate_hz: 20.0, lines: 20,
     samples_per_line: 5000, preparation_cycles: 1, scan_id: one}
 """
-LONGER = 5.0
+LONGER = ViewSettings().closing + 10.0
 """Seconds that a scan may take longer beside a view, on a machine that does much else."""
 
 
