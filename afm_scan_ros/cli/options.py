@@ -22,7 +22,7 @@ from afm_scan_ros.bag.record import is_table, read_record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.intersample import HELD, INTERSAMPLE
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import ProgressCallback, Step
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns
 from afm_scan_ros.files.paths import refuse_unwritable
@@ -162,8 +162,19 @@ def _progress_line(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
         return
     columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(visible(title))
-        yield lambda doing: progress.update(task, description=visible(f"{title}: {doing}"))
+        task, began = progress.add_task(visible(title)), monotonic()
+
+        def report(doing: str) -> None:
+            said = f"{title}: {doing}{_time_left(doing, monotonic() - began)}"
+            progress.update(task, description=visible(said))
+
+        yield report
+
+
+def _time_left(doing: str, elapsed: float) -> str:
+    """Say how long the rest takes, where the parts of what is done are counted."""
+    left = doing.left(elapsed) if isinstance(doing, Step) else None
+    return "" if left is None else f", about {left:.0f} s left"
 
 
 def in_lines(
@@ -178,7 +189,8 @@ def in_lines(
         now = clock()
         if now >= due:
             due = now + EVERY
-            say(f"{title}: {doing} ({now - began:.0f} s)", err=True)
+            left = _time_left(doing, now - began)
+            say(f"{title}: {doing} ({now - began:.0f} s{left})", err=True)
 
     return report
 

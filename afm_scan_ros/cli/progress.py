@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 
 from afm_scan_ros.cli.options import in_lines
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import ProgressCallback, Step
 from afm_scan_ros.report.terminal import visible
 
 
@@ -27,7 +27,7 @@ class ScanProgress:
     def moved(self, sample: int, total: int) -> None:
         """Show how many samples of all are achieved."""
         self._bar.update(self._task, completed=sample, total=total)
-        self._report(f"{sample / total:.0%}, sample {sample} of {total}")
+        self._report(Step(f"{sample / total:.0%}, sample {sample} of {total}", sample, total))
 
     def say(self, news: str) -> None:
         """Show what the user should know, once and to stay."""

@@ -73,9 +73,8 @@ def run_scan(
         time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
     refuse_pace(time_scale)
     online = {**dict.fromkeys(ONLINE, False), **online}
-    for name, where in views.items():
-        VIEWS[name].refuse(where)
-    _refuse_unsuited(spec, files.scanner, [name for name, wanted in online.items() if wanted])
+    wanted = [name for name, chosen in online.items() if chosen]
+    _refuse_unsuited(spec, files.scanner, wanted, views)
     correction = _correction(files.learned, spec, model, inverses)
     if (exchange := exchange_of(files.scanner)) is not None:
         scan_by_files(exchange, spec, model, inverses_of(inverses, INVERSES), files.bag, correction)
@@ -92,11 +91,22 @@ def run_scan(
         raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 
 
-def _refuse_unsuited(spec: ScanSpec, scanner: str, online: Collection[str]) -> None:
-    """Raise InputError for a scan that cannot be corrected as it goes on."""
+def _refuse_unsuited(
+    spec: ScanSpec, scanner: str, online: Collection[str], views: Mapping[str, str]
+) -> None:
+    """Raise InputError for a scan that cannot be corrected, or shown, as it goes on."""
+    for name, where in views.items():
+        VIEWS[name].refuse(where)
     for name in online:
         ONLINE[name].refuse_unsuited(spec)
-    if online and scanner.partition(":")[0] == FILES:
+    if scanner.partition(":")[0] != FILES:
+        return
+    if views:
+        raise InputError(
+            f"--scanner {scanner}: files are exchanged once a scan, so that nothing can be seen"
+            f" while it runs: scan without --{' and --'.join(views)}"
+        )
+    if online:
         raise InputError(
             f"--scanner {scanner}: a correction during the scan needs a line's readings before a"
             " later line begins, but files are exchanged once a scan: scan without it"

@@ -1,7 +1,7 @@
 """Frozen records and array types used by the whole package."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 from attrs import frozen
@@ -12,7 +12,25 @@ Array: TypeAlias = NDArray[np.float64]
 AXES = ("x", "y")
 
 ProgressCallback: TypeAlias = Callable[[str], None]
-"""Is called with what a long computation is doing."""
+"""Is called with what a long computation is doing; a ``Step`` where its parts are counted."""
+
+
+class Step(str):
+    """What a long computation is doing, when ``done`` of its ``total`` equal parts are over."""
+
+    __slots__ = ("done", "total")
+    done: int
+    total: int
+
+    def __new__(cls, text: str, done: int, total: int) -> Self:
+        """Return a step with its text."""
+        step = super().__new__(cls, text)
+        step.done, step.total = done, total
+        return step
+
+    def left(self, elapsed: float) -> float | None:
+        """Return how long (s) the rest takes at the pace so far; None before any part is over."""
+        return elapsed * (self.total - self.done) / self.done if self.done else None
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:

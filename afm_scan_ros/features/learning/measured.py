@@ -17,7 +17,7 @@ from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, total_samples
-from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Trace
+from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Step, Trace
 from afm_scan_ros.features.learning.loop import SCANS, LearningScan, best_of
 from afm_scan_ros.features.learning.loop import learn as learning_scans
 from afm_scan_ros.files.learned_file import save_learned
@@ -86,7 +86,8 @@ def learn(
     limits
         The amplifier's voltage and slew; none where None.
     progress
-        Is called with what is being done.
+        Is called before each scan with what is being done, text that also has how many scans are
+        ``done`` of a ``total``; its ``left(elapsed)`` is the time that the rest takes.
 
     Returns
     -------
@@ -122,7 +123,7 @@ def learn(
     of_type(ScanSpec, "spec", spec, SPEC)
     of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
     scans = whole("scans", scans, 1)
-    session = _Measured(measure, limits or UNLIMITED, progress or _silent)
+    session = _Measured(measure, limits or UNLIMITED, progress or _silent, scans)
     found = list(learning_scans(session, model.scanner, spec, scans, session.limits))
     if not best_of(found).steps:
         LOG.warning("no scan was better than the first two: the correction is zero")
@@ -136,13 +137,16 @@ class _Measured:
     measure: Measure
     limits: DriveLimits
     progress: ProgressCallback
+    scans: int
+    done: int = 0
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel, correction: Correction) -> Scan:
         """Scan with all of a model's inverses."""
         period = spec.sample_period
         compensation = Compensation(model, period, INVERSES, InverseSettings(), self.limits)
         drive = compensation.whole(correction.reference())
-        self.progress(f"{label}: {len(drive.x)} samples")
+        self.progress(Step(f"{label}: {len(drive.x)} samples", self.done, self.scans))
+        self.done += 1
         measured = samples("measure", self.measure(np.column_stack([drive.x, drive.y])))
         count = total_samples(spec)
         if measured.shape != (count, len(AXES)):

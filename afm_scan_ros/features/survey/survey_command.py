@@ -14,6 +14,7 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.cli.options import FIGURES, FOLDER, RECORD, grouped, positive, working
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.types import Step
 from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag
 from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
 from afm_scan_ros.features.survey.changes import changes
@@ -99,7 +100,7 @@ class Surveyor:
                     self.folder.keep(new[task], outcome)
                 else:
                     kept[new[task]] = task.failed(outcome)
-                progress(f"{number} of {len(new)}: {task.bag}")
+                progress(Step(f"{number} of {len(new)}: {task.bag}", number, len(new)))
         for name, task in assigned.items():
             kept[name] = evolve(kept[name], bag=task.bag, instrument=task.instrument)
         return self._written(sorted(kept.values(), key=lambda r: (r.instrument, r.recorded, r.bag)))
