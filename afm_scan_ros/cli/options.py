@@ -174,7 +174,7 @@ def _progress_line(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
 def _time_left(doing: str, elapsed: float) -> str:
     """Say how long the rest takes, where the parts of what is done are counted."""
     left = doing.left(elapsed) if isinstance(doing, Step) else None
-    return "" if left is None else f", about {left:.0f} s left"
+    return f", about {left:.0f} s left" if left and left >= 1.0 else ""
 
 
 def in_lines(

@@ -41,7 +41,7 @@ def listen(where: str, settings: ViewSettings, wanted: Callable[[], bool]) -> No
         while wanted() and not shown.is_written:
             _hear(executor, settings.refresh)
             shown.refresh()
-        _hear(executor, settings.refresh)
+        _hear_the_rest(executor, shown, settings)
         shown.refresh(last=True)
         executor.shutdown()
     finally:
@@ -52,6 +52,16 @@ def _hear(executor: SingleThreadedExecutor, longest: float) -> None:
     deadline = time.monotonic() + longest
     while (left := deadline - time.monotonic()) > 0.0:
         executor.spin_once(timeout_sec=left)
+
+
+def _hear_the_rest(
+    executor: SingleThreadedExecutor, shown: "ShownNodes", settings: ViewSettings
+) -> None:
+    """Hear what has come but was not read, until a look finds nothing more."""
+    deadline, before = time.monotonic() + settings.closing, -1
+    while shown.heard != before and time.monotonic() < deadline:
+        before = shown.heard
+        _hear(executor, settings.refresh)
 
 
 def _subscribe(node: Node, shown: "ShownNodes") -> None:
@@ -82,6 +92,7 @@ class ShownNodes:
     _where: str
     _settings: ViewSettings
     _screen: Screen | None = field(default=None, init=False)
+    heard: int = field(default=0, init=False)
     _samples: list[Message] = field(factory=list, init=False)
     _next: int | None = field(default=None, init=False)
     _reasons: dict[str, str] = field(factory=dict, init=False)
@@ -109,10 +120,12 @@ class ShownNodes:
 
     def sample(self, message: Message) -> None:
         """Take one sample of all curves."""
+        self.heard += 1
         self._samples.append(message)
 
     def line(self, name: str, message: Message) -> None:
         """Show the figures of a line."""
+        self.heard += 1
         if self._screen is not None:
             self._screen.line(name, line_of(self._screen.info, message))
 
