@@ -18,7 +18,6 @@ from afm_scan_ros.core.streams import (
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.features.view.screen import ERROR, Screen
-from afm_scan_ros.report.style import NANO
 
 COMPARED = (DESIRED, ACHIEVED)
 
@@ -94,7 +93,7 @@ class ShownLines:
             first = self._where.start + number * self._spec.samples_per_line
             self._screen.line("tracking_error", line_error(number, first, line[1:]))
             if self._frame is not None:
-                self._image[number] = NANO * _trace(line[0], line[1], self._frame)
+                self._image[number] = _trace(line[0], line[1], self._frame)
                 self._screen.image("error_x", self._image)
 
 

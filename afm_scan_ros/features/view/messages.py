@@ -6,7 +6,6 @@ from afm_scan_ros.bag.typestore import Message, stamp_of
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineError
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.style import NANO
 
 IMAGE_TOPICS = {"scan_image/trace": "trace", "scan_image/retrace": "retrace"}
 """Ends of topics of images, and their names in the view."""
@@ -20,6 +19,6 @@ def line_of(info: ScanInfo, message: Message) -> LineError:
 
 
 def heights(message: Message) -> Array:
-    """Return the heights, nm, of an image of float32 that ``scan_imager`` publishes."""
+    """Return the heights, m, of an image of float32 that ``scan_imager`` publishes."""
     values = np.frombuffer(np.asarray(message.data).tobytes(), "<f4")
-    return NANO * values.reshape(message.height, message.width).astype(np.float64)
+    return values.reshape(message.height, message.width).astype(np.float64)

@@ -10,7 +10,7 @@ AUTOGROUP = Path("/proc/self/autogroup")
 
 def give_way(niceness: int) -> None:
     """Lower the priority of this process and of its session, which it has of its own."""
-    os.nice(niceness)
+    os.nice(max(0, niceness - os.nice(0)))
     with suppress(OSError):  # Linux without it, or another system
         AUTOGROUP.write_text(str(niceness), "ascii")
 

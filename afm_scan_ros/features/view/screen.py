@@ -16,7 +16,7 @@ from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, LineError
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import LOOPBACK, WINDOW, ports
-from afm_scan_ros.report.style import BLUE, LIGHT_BLUE, LIGHT_ORANGE, MICRO, NANO, ORANGE
+from afm_scan_ros.files.units import UNITS
 
 ERROR = "error"
 SCAN_TIME, WALL_CLOCK = "scan_time", "wall_clock"
@@ -25,30 +25,34 @@ SCAN_TIME, WALL_CLOCK = "scan_time", "wall_clock"
 
 @frozen
 class Panel:
-    """A panel of curves with its title and the factor from SI units to those of the title."""
+    """A panel of curves: its folder, its title, its unit and the colour of each curve."""
 
     folder: str
-    title: str
+    name: str
+    unit: str
     curves: Mapping[str, str]
-    scale: float = 1.0
+
+    @property
+    def title(self) -> str:
+        """Title with the unit."""
+        return f"{self.name}, {self.unit.replace('um', 'µm')}"
 
 
-DARK, LIGHT = (BLUE, ORANGE), (LIGHT_BLUE, LIGHT_ORANGE)
+DARK, LIGHT = ("#0b5fa5", "#c4501b"), ("#86b6de", "#eaa987")
+"""Blue for x, orange for y, as in the figures of reports, whose module is slow to import."""
 OF_LINES = {
     f"{kind}_{axis}": colour
     for kind, colours in (("rms", DARK), ("max", LIGHT))
     for axis, colour in zip(AXES, colours, strict=True)
 }
-OF_AXES = dict(zip(AXES, DARK, strict=True))
+OF_AXES, FAINT = (dict(zip(AXES, colours, strict=True)) for colours in (DARK, LIGHT))
 PANELS = {
-    DESIRED: Panel(
-        "displacement/desired", "Displacement, µm", dict(zip(AXES, LIGHT, strict=True)), MICRO
-    ),
-    ACHIEVED: Panel("displacement/achieved", "Displacement, µm", OF_AXES, MICRO),
-    ERROR: Panel("error", "Error (achieved - desired), nm", OF_AXES, NANO),
-    DRIVE: Panel("drive", "Drive, V", OF_AXES),
-    "tracking_error": Panel("lines/error", "Error of each line, nm", OF_LINES, NANO),
-    "model_residual": Panel("lines/residual", "Residual of each line, nm", OF_LINES, NANO),
+    DESIRED: Panel("displacement/desired", "Displacement", "um", FAINT),
+    ACHIEVED: Panel("displacement/achieved", "Displacement", "um", OF_AXES),
+    ERROR: Panel("error", "Error (achieved - desired)", "nm", OF_AXES),
+    DRIVE: Panel("drive", "Drive", "V", OF_AXES),
+    "tracking_error": Panel("lines/error", "Error of each line", "nm", OF_LINES),
+    "model_residual": Panel("lines/residual", "Residual of each line", "nm", OF_LINES),
 }
 Whole: TypeAlias = NDArray[np.int64]
 Rows: TypeAlias = tuple[Whole, Array]
@@ -90,8 +94,8 @@ class Screen:
             self._add(PANELS[name], each, samples, np.array([getattr(figures, each)]))
 
     def image(self, name: str, values: Array) -> None:
-        """Show an image in nm as far as it is known; what is not is not a number."""
-        self._images[name] = values
+        """Show an image (m) as far as it is known; what is not is not a number."""
+        self._images[name] = values / UNITS["nm"]
 
     def state(self, node: str, state: str, sample: int, reason: str) -> None:
         """Show the state of a node, or of the scan."""
@@ -126,7 +130,7 @@ class Screen:
 
     def _add(self, panel: Panel, name: str, samples: Whole, values: Array) -> None:
         rows = self._rows.setdefault(f"{panel.folder}/{name}", [])
-        rows.append((samples, panel.scale * values))
+        rows.append((samples, values / UNITS[panel.unit]))
 
     def _show_stills(self) -> None:
         """Show images and states, of which the viewer keeps the last ones alone."""

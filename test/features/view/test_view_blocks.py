@@ -83,7 +83,7 @@ def test_without_gaps_every_line_and_every_step_is_shown() -> None:
     for curve in found.curves.values():
         assert list(curve) == list(range(0, TOTAL, STEP))
     assert np.isfinite(found.images["error_x"]).all()
-    assert np.abs(found.images["error_x"]).max() < 100.0  # nm, of noise of 10 nm
+    assert np.abs(found.images["error_x"]).max() < 1e-7  # of noise of 10 nm
 
 
 @given(st.sets(st.integers(0, len(BLOCKS) - 1)))
