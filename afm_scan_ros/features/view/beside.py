@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from tempfile import TemporaryFile
+from typing import IO
 
 import numpy as np
 from attrs import asdict, frozen
@@ -90,6 +91,7 @@ def _viewing(
     """Run the viewer's process; at the end it has a moment to show the rest."""
     ours, theirs = socket.socketpair()
     with ours, TemporaryFile("w+", encoding="utf-8") as output:
+        os.utime(output.fileno(), (0, 0))
         with theirs:
             code = run_after(settings.niceness, _RUN)
             process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
@@ -105,7 +107,7 @@ def _viewing(
             yield handover
         finally:
             handover.finish()
-            if left := _left(process, where, settings):
+            if left := _left(process, output, settings):
                 listener.say(f"--view: {left}")
             handover.close()
             output.seek(0)
@@ -113,20 +115,29 @@ def _viewing(
                 listener.say(f"--view: {said.splitlines()[-1]}")
 
 
-def _left(process: "subprocess.Popen[bytes]", where: str, settings: ViewSettings) -> str:
-    """Let the viewer show the rest, for a while; say where it has not."""
-    waits = settings.closing if where == WINDOW else settings.finishing
-    deadline, patience = (time.monotonic() + wait for wait in (waits, settings.closing))
+def _left(process: "subprocess.Popen[bytes]", output: IO[str], settings: ViewSettings) -> str:
+    """Let the viewer show the rest as long as it goes on; say where it has not shown it."""
+    began = changed = time.monotonic()
+    last = _sign(output)
     while process.poll() is None:
-        now = time.monotonic()
-        if now > deadline or (now > patience and _is_stopped(process.pid)):
-            return "the viewer is behind, and the scan did not wait for it"
+        now, sign = time.monotonic(), _sign(output)
+        if sign != last:
+            changed, last = now, sign
+        begun = sign or _is_stopped(process.pid)
+        patience = settings.closing if begun else settings.opening
+        if now > min(changed + patience, began + settings.finishing):
+            return "the viewer is behind, and the scan did not wait for it: 'afm-scan view' the bag"
         time.sleep(settings.refresh)
     return ""
 
 
 def _is_stopped(child: int) -> bool:
     return os.waitid(os.P_PID, child, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def _sign(output: IO[str]) -> int:
+    """Return the last sign of the viewer's process, which sets its output's time; 0 for none."""
+    return os.fstat(output.fileno()).st_mtime_ns
 
 
 _SETTINGS = ViewSettings()

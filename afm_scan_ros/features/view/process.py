@@ -1,5 +1,6 @@
 """The process that feeds the viewer during a scan: best effort, and of low priority."""
 
+import os
 import socket
 import sys
 import time
@@ -17,7 +18,7 @@ from afm_scan_ros.features.view import kinds
 from afm_scan_ros.features.view.blocks import ShownBlocks
 from afm_scan_ros.features.view.screen import Screen, open_screen
 from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW, Viewer, open_window
+from afm_scan_ros.features.view.viewer import WINDOW, open_window
 
 SCAN_PART = "scan"
 """Name of what is a scan in one process, in the table of states."""
@@ -29,18 +30,19 @@ def main(descriptor: str, source: str, where: str) -> None:
     link = Link(socket.socket(fileno=int(descriptor)))
     try:
         viewer = open_window(settings) if where == WINDOW else None
+
+        def wanted() -> bool:
+            os.utime(sys.stdout.fileno())  # the sign that this process goes on
+            return viewer is None or viewer.poll() is None
+
         if source == kinds.NODES:
             from afm_scan_ros.features.view.listening import listen  # noqa: PLC0415 - needs ROS
 
-            listen(where, settings, lambda: not _closed(viewer) and not _is_over(link))
+            listen(where, settings, lambda: wanted() and not _is_over(link))
         else:
-            show_link(link, where, settings, lambda: not _closed(viewer))
+            show_link(link, where, settings, wanted)
     except (InputError, ScanError, OSError) as error:
         sys.exit(str(error))
-
-
-def _closed(viewer: Viewer) -> bool:
-    return viewer is not None and viewer.poll() is not None
 
 
 def _is_over(link: Link) -> bool:
@@ -68,7 +70,7 @@ def show_link(link: Link, where: str, settings: ViewSettings, wanted: Callable[[
         if shown is not None:
             shown.screen.refresh()
     if shown is not None:
-        shown.screen.refresh(last=True)
+        shown.end()
 
 
 def _batches(link: Link, interval: float) -> Iterator[list[Message]]:
@@ -94,6 +96,7 @@ class ShownPipeline:
     _settings: ViewSettings
     _blocks: ShownBlocks = field(init=False)
     _sample: int = field(default=0, init=False)
+    _is_over: bool = field(default=False, init=False)
 
     def __attrs_post_init__(self) -> None:
         self._blocks = ShownBlocks(self.info, self.screen, self._settings.pixels)
@@ -113,6 +116,7 @@ class ShownPipeline:
         elif message.kind == kinds.DOING:
             self._state("ready", fields["what"])
         elif message.kind == kinds.ENDED:
+            self._is_over = True
             self._state(fields["state"], fields["reason"])
             why = fields["reason"]
             ended = f"the scan has failed: {why}" if why else "the scan is done"
@@ -121,6 +125,14 @@ class ShownPipeline:
             self.screen.say(fields["text"], self._sample)
         elif message.kind == kinds.LEFT_OUT:
             self.screen.say(f"{fields['count']} blocks or news are {kinds.MISSING}", self._sample)
+
+    def end(self) -> None:
+        """Show the last of it, and say where that is not the end of the scan."""
+        if not self._is_over:
+            why = f"what follows is {kinds.MISSING}"
+            self._state("no longer shown", why)
+            self.screen.say(why, self._sample)
+        self.screen.refresh(last=True)
 
     def _state(self, state: str, reason: str) -> None:
         self.screen.state(SCAN_PART, state, self._sample, reason)

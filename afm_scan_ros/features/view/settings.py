@@ -26,15 +26,15 @@ class ViewSettings:
     )
     pixels: int = setting(256, "1", "Pixels in a line of the image of errors", "as of scan_imager")
     closing: float = setting(
-        1.0,
+        3.0,
         "s",
-        "Longest wait of a scan, when it is over, for the viewer to show the rest",
-        "what is waiting takes 0.1 s; one that is stopped is left behind",
+        "Longest wait of a scan, when it is over, for a sign that the viewer shows the rest",
+        "sixty updates; one that is stopped is left behind",
     )
     finishing: float = setting(
         60.0,
         "s",
-        "As closing, where a file is written by a process that is not stopped",
+        "Longest wait, when it is over, for a viewer that goes on",
         "nothing moves any more; on two cores with ten busy processes it takes half of that",
     )
     giving_up: float = setting(
