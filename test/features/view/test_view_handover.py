@@ -108,3 +108,16 @@ def test_a_process_that_is_gone_or_does_not_read_holds_up_nothing() -> None:
             handover.finish()
             handover.close()
             assert time.monotonic() - began < 2.0
+
+
+def test_the_last_word_comes_after_blocks_that_wait() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        handover = Handover(ours, SETTINGS)
+        handover.last(Message(kinds.ENDED))
+        for number in range(ROOM // 2):
+            handover.block(block(number))
+        handover.finish()
+        messages: list[Message] = []
+        read_slowly(theirs, 0.0, messages)
+    assert [each.kind for each in messages] == [kinds.BLOCK] * (ROOM // 2) + [kinds.ENDED]

@@ -11,7 +11,7 @@ import pytest
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.streams import monitor_step
 from afm_scan_ros.features.view.settings import ViewSettings
-from helpers.viewed import command, curve, feeder_of, let_go_on, news, recorded
+from helpers.viewed import command, curve, feeder_of, let_go_on, news, recorded, states
 
 pytest.importorskip("rerun", reason="the viewer is not installed: pip install 'afm_scan_ros[view]'")
 
@@ -57,6 +57,7 @@ def test_a_file_shows_what_the_bag_holds(spec: Path, plain: np.ndarray, tmp_path
     for path in ("/lines/error/rms_x", "/lines/residual/max_y"):
         assert len(curve(file, path)[1]) == 20
     assert news(file) == ["the scan is done"]
+    assert f"| scan | done | {info.total_samples} (100%) |" in states(file)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
