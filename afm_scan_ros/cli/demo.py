@@ -8,7 +8,7 @@ import click
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.execution import how_scans_run
-from afm_scan_ros.cli.options import CONFIG, FIGURES, FOLDER
+from afm_scan_ros.cli.options import CONFIG, FIGURE_FORMATS, FOLDER
 from afm_scan_ros.cli.orders import ScanFiles
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.core.model import INVERSES
@@ -66,8 +66,14 @@ IMAGED = (
     show_default=True,
     help="Folder for bags, tables and report.",
 )
-@FIGURES
-def demo(out: Path, figures: str | None) -> None:
+@click.option(
+    "--figures",
+    type=FIGURE_FORMATS,
+    default="png",
+    show_default=True,
+    help="Format of the figures beside the report.",
+)
+def demo(out: Path, figures: str) -> None:
     """Scan a simulated scanner without and with compensation, and compare the errors.
 
     The scanner is config/plant.yaml. The model is config/model.yaml, identified from simulated
@@ -89,7 +95,7 @@ def demo(out: Path, figures: str | None) -> None:
     }
     made = demo_report(tables, compared, (IMAGED[0], _images(out)), next_commands(out), ran)
     made.write(out / "report.html", figures)
-    click.echo(f"ReportPage: {out / 'report.html'}. Bags and JSON are in the same folder.")
+    click.echo(f"Report: {out / 'report.html'}. Figures, bags and JSON are in the same folder.")
 
 
 def next_commands(out: Path) -> Iterator[CommandLine]:

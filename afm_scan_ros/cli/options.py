@@ -77,9 +77,10 @@ class _Path(click.Path):
 
 FILE = _Path(dir_okay=False)
 NEW_FILE = _Path(dir_okay=False, new=True)
+FIGURE_FORMATS = click.Choice(["pdf", "svg", "png"])
 FIGURES = click.option(
     "--figures",
-    type=click.Choice(["pdf", "svg", "png"]),
+    type=FIGURE_FORMATS,
     help="Write each picture of the report beside it too, as files of this format.",
 )
 FOLDER = _Path(file_okay=False, new=True)

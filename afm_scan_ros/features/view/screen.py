@@ -24,7 +24,7 @@ SCAN_TIME, WALL_CLOCK = "scan_time", "wall_clock"
 
 
 @frozen
-class Panel:
+class ScreenPanel:
     """A panel of curves: its folder, its title, its unit and the colour of each curve."""
 
     folder: str
@@ -47,12 +47,12 @@ OF_LINES = {
 }
 OF_AXES, FAINT = (dict(zip(AXES, colours, strict=True)) for colours in (DARK, LIGHT))
 PANELS = {
-    DESIRED: Panel("displacement/desired", "Displacement", "um", FAINT),
-    ACHIEVED: Panel("displacement/achieved", "Displacement", "um", OF_AXES),
-    ERROR: Panel("error", "Error (achieved - desired)", "nm", OF_AXES),
-    DRIVE: Panel("drive", "Drive", "V", OF_AXES),
-    "tracking_error": Panel("lines/error", "Error of each line", "nm", OF_LINES),
-    "model_residual": Panel("lines/residual", "Residual of each line", "nm", OF_LINES),
+    DESIRED: ScreenPanel("displacement/desired", "Displacement", "um", FAINT),
+    ACHIEVED: ScreenPanel("displacement/achieved", "Displacement", "um", OF_AXES),
+    ERROR: ScreenPanel("error", "Error (achieved - desired)", "nm", OF_AXES),
+    DRIVE: ScreenPanel("drive", "Drive", "V", OF_AXES),
+    "tracking_error": ScreenPanel("lines/error", "Error of each line", "nm", OF_LINES),
+    "model_residual": ScreenPanel("lines/residual", "Residual of each line", "nm", OF_LINES),
 }
 Whole: TypeAlias = NDArray[np.int64]
 Rows: TypeAlias = tuple[Whole, Array]
@@ -128,7 +128,7 @@ class Screen:
             self._show_stills()
         self.stream.flush(blocking=True)
 
-    def _add(self, panel: Panel, name: str, samples: Whole, values: Array) -> None:
+    def _add(self, panel: ScreenPanel, name: str, samples: Whole, values: Array) -> None:
         rows = self._rows.setdefault(f"{panel.folder}/{name}", [])
         rows.append((samples, values / UNITS[panel.unit]))
 
