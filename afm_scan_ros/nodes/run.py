@@ -27,6 +27,7 @@ from afm_scan_ros.nodes.topics import NODE_STATE
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 NICENESS = -11
 """Of a node in real time: PulseAudio's by default (pulse-daemon.conf, nice-level)."""
+AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def node_class(name: str) -> type[ScanNode]:
@@ -72,11 +73,15 @@ def _made(kind: type[ScanNode]) -> ScanNode:
 def _take_priority(node: ScanNode) -> None:
     """Let a node that has to keep pace come before usual work, as an audio server does.
 
-    All its threads: those of DDS are there by now. A system may not permit it.
+    All its threads: those of DDS are there by now. Where Linux schedules sessions first, niceness
+    counts only within one, and the commands give each node a session of its own: this gets the
+    same niceness. A system may not permit it.
     """
     try:
         for thread in Path("/proc/self/task").iterdir():
             os.setpriority(os.PRIO_PROCESS, int(thread.name), NICENESS)
+        if AUTOGROUP.exists() and os.getsid(0) == os.getpid():
+            AUTOGROUP.write_text(str(NICENESS), "ascii")
     except OSError as error:
         node.get_logger().info(f"no priority over other work: {error}")
 

@@ -1,5 +1,6 @@
 """The nodes as separate processes that really talk: a scan stopped, and broken."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli import processes
 from afm_scan_ros.cli.processes import NodeProcess
 from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.nodes.run import NICENESS
 from afm_scan_ros.nodes.topics import NODE_STATE
 from helpers.ros import PATIENCE, joined, until
 
@@ -82,6 +84,17 @@ def test_a_node_without_a_scan_says_what_it_waits_for_and_why_it_ends(
     said, last = written(node), written(node).splitlines()[-1]
     assert "/piezoscanner_sim reads /drive_voltage, /node_state, /scan_info; it publishes" in said
     assert last.endswith("ends: interrupted by SIGINT")
+
+
+def test_a_node_that_keeps_pace_comes_before_usual_work(nodes: Nodes, operator: Operator) -> None:
+    """Also where Linux shares the processor among sessions first, each node having its own."""
+    node = nodes(["piezoscanner_sim"])["piezoscanner_sim"]
+    until(lambda: "ready: waits for scan_info" in written(node), operator)
+    if "no priority over other work" in written(node):
+        pytest.skip("the system does not permit it")
+    assert os.getpriority(os.PRIO_PROCESS, node.process.pid) == NICENESS
+    session = Path(f"/proc/{node.process.pid}/autogroup")
+    assert not session.exists() or session.read_text("ascii").split()[-1] == str(NICENESS)
 
 
 def test_a_stop_ends_the_scan_smoothly_at_rest(
