@@ -34,7 +34,7 @@ from afm_scan_ros.core.model import (
 from afm_scan_ros.core.types import Array, floats
 
 AT_LIMIT = 1.8
-"""Largest ratio of a band's rms to its detection limit at which no effect is searched for."""
+"""Largest ratio of a band's rms to its detection limit that is as expected."""
 MISSED_FACTOR = 1.5
 """Factor of the error over the known share, where unmodelled modes dominate it."""
 HARMONIC_SHARE = 0.5
