@@ -1,7 +1,8 @@
 """Each of the eight reports in a real browser, which is Debian's chromium."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -31,14 +32,26 @@ FIRST = f"({START})(document.querySelector('.panel'))"
 BACKGROUND = "getComputedStyle(document.body).backgroundColor"
 
 
+Made = Callable[[str], Path]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of the eight reports, each under the name of its command."""
-    made = tmp_path_factory.mktemp("reports")
-    bag = recorded(made / "bag")
-    for name, report in REPORTS.items():
-        report(bag).write(made / f"{name}.html", None)
-    return made
+    """Folder of the reports, each under the name of its command."""
+    return tmp_path_factory.mktemp("reports")
+
+
+@pytest.fixture(scope="module")
+def made(folder: Path) -> Made:
+    """Return a function that writes the report of a command, once."""
+    bag = recorded(folder / "bag")
+
+    @cache
+    def make(name: str) -> Path:
+        REPORTS[name](bag).write(folder / f"{name}.html", None)
+        return folder / f"{name}.html"
+
+    return make
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +62,8 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def page(browser: Browser, folder: Path) -> Iterator[Page]:
+def page(browser: Browser) -> Iterator[Page]:
     """An empty page, without a network; what it writes to the console fails the test."""
-    del folder
     said: list[str] = []
     context = browser.new_context(viewport=DESK, offline=True)
     shown = context.new_page()
@@ -77,13 +89,20 @@ def serious(page: Page, **options: object) -> list[dict[str, Any]]:
     return [each for each in found if each["impact"] in {"serious", "critical"}]
 
 
-@pytest.mark.parametrize("name", REPORTS)
+EACH = [
+    pytest.param(name, marks=[] if name == "analyze" else pytest.mark.evidence) for name in REPORTS
+]
+"""All reports, of which one is opened in the suite, and the others in the evidence."""
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_each_report_answers_zooms_and_is_read_by_everyone(
-    name: str, page: Page, folder: Path
+    name: str, page: Page, made: Made
 ) -> None:
-    opened(page, folder / f"{name}.html")
+    file = made(name)
+    opened(page, file)
     _answers_above_the_fold(page)
-    page.screenshot(path=folder / f"{name}.png")
+    page.screenshot(path=file.with_suffix(".png"))
     _zooms_by_keys(page)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
     assert serious(page) == []
@@ -94,7 +113,7 @@ def test_each_report_answers_zooms_and_is_read_by_everyone(
     assert serious(page, runOnly=["color-contrast"]) == []
     page.set_viewport_size(PHONE)
     page.wait_for_function(f"document.documentElement.scrollWidth <= {PHONE['width']}")
-    assert (folder / f"{name}.html").stat().st_size < LARGEST
+    assert file.stat().st_size < LARGEST
 
 
 def _answers_above_the_fold(page: Page) -> None:
@@ -119,9 +138,9 @@ def _zooms_by_keys(page: Page) -> None:
 
 
 def test_a_value_is_shown_and_a_box_zooms_every_panel_over_the_same_time(
-    page: Page, folder: Path
+    page: Page, made: Made
 ) -> None:
-    opened(page, folder / "analyze.html")
+    opened(page, made("analyze"))
     panels = page.locator("figure").first.locator(".panel")
     box = panels.nth(0).bounding_box()
     assert box is not None
@@ -148,8 +167,9 @@ def picked(page: Page) -> Any:  # noqa: ANN401 - a list of numbers
     )
 
 
-def test_a_line_of_an_image_that_is_picked_shows_its_traces(page: Page, folder: Path) -> None:
-    opened(page, folder / "demo.html")
+@pytest.mark.evidence
+def test_a_line_of_an_image_that_is_picked_shows_its_traces(page: Page, made: Made) -> None:
+    opened(page, made("demo"))
     before = picked(page)
     image = page.locator("figure .panel").first.bounding_box()
     assert image is not None
@@ -161,8 +181,9 @@ def test_a_line_of_an_image_that_is_picked_shows_its_traces(page: Page, folder: 
     assert picked(page) != tapped
 
 
-def test_a_band_of_the_residual_that_is_picked_shows_its_spectrum(page: Page, folder: Path) -> None:
-    opened(page, folder / "diagnose.html")
+@pytest.mark.evidence
+def test_a_band_of_the_residual_that_is_picked_shows_its_spectrum(page: Page, made: Made) -> None:
+    opened(page, made("diagnose"))
     panels = page.locator("figure").first.locator(".panel")
     box = panels.nth(0).bounding_box()
     assert box is not None
@@ -174,26 +195,28 @@ def test_a_band_of_the_residual_that_is_picked_shows_its_spectrum(page: Page, fo
     assert shown in [pytest.approx(band, rel=1e-4) for band in bands]
 
 
-def test_links_lead_on(page: Page, folder: Path) -> None:
-    opened(page, folder / "close-loop.html")
+@pytest.mark.evidence
+def test_links_lead_on(page: Page, folder: Path, made: Made) -> None:
+    opened(page, made("close-loop"))
     (folder / "round_1").mkdir(exist_ok=True)
-    shutil.copy(folder / "diagnose.html", folder / "round_1/report.html")
+    shutil.copy(made("diagnose"), folder / "round_1/report.html")
     page.click("summary")
     page.click("text=Diagnosis of round 1")
     page.wait_for_function(READY)
     assert page.title() == "Diagnosis of a scanner's residual"
 
 
-def test_everything_is_printed(page: Page, folder: Path) -> None:
-    opened(page, folder / "analyze.html")
+def test_everything_is_printed(page: Page, made: Made) -> None:
+    opened(page, made("analyze"))
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("details:not([open])").count() == 0
     page.emulate_media(media="print")
     assert not page.locator("#theme").is_visible()
 
 
-def test_a_survey_is_sorted_searched_and_leads_to_its_recordings(page: Page, folder: Path) -> None:
-    opened(page, folder / "survey.html")
+@pytest.mark.evidence
+def test_a_survey_is_sorted_searched_and_leads_to_its_recordings(page: Page, made: Made) -> None:
+    opened(page, made("survey"))
     rows, status = page.locator(".listing tbody tr"), page.locator(".listing [role=status]")
     assert rows.count() == 50
     assert status.inner_text() == "1 to 50 of 400"
@@ -210,13 +233,15 @@ def test_a_survey_is_sorted_searched_and_leads_to_its_recordings(page: Page, fol
     told = page.locator(".listing .opened").inner_text()
     assert "gain 1.0100 ± 0.0010" in told
     page.fill(".listing input", "night_00000 afm0")
+    made("demo")  # the report that all rows of this survey lead to
     page.click(".listing tbody a")
     page.wait_for_function(READY)
     assert page.title() == "A piezoscanner without and with compensation"
 
 
-def test_trends_are_those_of_the_instrument_that_is_chosen(page: Page, folder: Path) -> None:
-    opened(page, folder / "survey.html")
+@pytest.mark.evidence
+def test_trends_are_those_of_the_instrument_that_is_chosen(page: Page, made: Made) -> None:
+    opened(page, made("survey"))
     values = "() => [...plotOf(document.querySelector('.panel')).renderers[3].data_source.data.y]"
     changed = page.evaluate(values)
     assert page.input_value("[data-variant-of]") == "afm3"
@@ -226,17 +251,14 @@ def test_trends_are_those_of_the_instrument_that_is_chosen(page: Page, folder: P
 
 
 @pytest.mark.evidence
-def test_ten_thousand_recordings_stay_quick(page: Page, folder: Path) -> None:
+def test_ten_thousand_recordings_are_sorted_again_and_again(page: Page, folder: Path) -> None:
     file = folder / "many.html"
     of_survey(10_000, 20).write(file, None)
     opened(page, file)
-    took = page.evaluate(
-        "() => { const start = performance.now();"
-        " const sort = document.querySelector('[data-sort=\"3\"]');"
-        " for (let k = 0; k < 10; k++) { sort.click(); }"
-        " return performance.now() - start; }"
+    page.evaluate(
+        "() => { const sort = document.querySelector('[data-sort=\"3\"]');"
+        " for (let k = 0; k < 10; k++) { sort.click(); } }"
     )
-    assert took < 10_000.0
     assert page.locator(".listing tbody tr").count() == 50
 
 

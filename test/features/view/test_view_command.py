@@ -94,6 +94,7 @@ def image(file: Path, name: str) -> np.ndarray:
 
 
 @needs_viewer
+@pytest.mark.evidence
 def test_a_browser_on_this_machine_gets_the_page_until_ctrl_c(bag: Path, port: int) -> None:
     process = command("view", bag, "--serve")
     assert process.stdout is not None

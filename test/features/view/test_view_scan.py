@@ -41,6 +41,7 @@ def plain(spec: Path) -> np.ndarray:
     return recorded(bag)
 
 
+@pytest.mark.evidence
 def test_a_file_shows_what_the_bag_holds(spec: Path, plain: np.ndarray, tmp_path: Path) -> None:
     bag, file = tmp_path / "bag", tmp_path / "scan.rrd"
     scan = command("scan", "--spec", spec, "--bag", bag, "--watch", "--view", file)
@@ -81,6 +82,7 @@ def test_a_view_that_falls_out_changes_no_sample(
     np.testing.assert_array_equal(recorded(bag), plain)
 
 
+@pytest.mark.evidence
 def test_a_scan_that_fails_says_why_in_its_view(spec: Path, tmp_path: Path) -> None:
     bag, file = tmp_path / "bag", tmp_path / "scan.rrd"
     scan = command("scan", "--spec", spec, "--time-scale", 1, "--bag", bag, "--view", file)
