@@ -108,8 +108,14 @@ def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one without lags where these are all that there is of its vibration.
 
     They stay where they have clearly the greater evidence, for loops of one rate look like a lag,
-    and where they are hidden between samples: there the model leaves them out.
+    and where they are hidden between samples: there the model leaves them out. A lead is none of a
+    scanner, and hysteresis that was fitted beside it is another one, so that it is fitted anew.
     """
+    if fit.leads:
+        fit = without_lags(fit)
+        progress("fitting without a lead")
+        settle(fit, fit.layout.settings.most_steps, searching=True)
+        return fit
     if not fit.lags_alone or fit.hidden_lag:
         return fit
     return _preferred(without_lags(fit), lambda: fit, progress, "a lag of the vibration")

@@ -126,6 +126,11 @@ class AxisFit:
         return self.lags_alone and self.mean_lag < self.shortest
 
     @property
+    def leads(self) -> bool:
+        """Whether the response is ahead of the drive by more than the fastest lag is long."""
+        return self.lags_alone and self.mean_lag < -float(self.layout.lags[0])
+
+    @property
     def mean_lag(self) -> float:
         """Mean of the lags, by their weights, s."""
         return float(self.theta[self.layout.parts["lags"]] @ self.layout.lags)

@@ -71,7 +71,10 @@ class ScoreTest:
         if not self.with_operator:
             precision = wider.layout.of_any_gain(precision)
         whole = self._matrix + precision[np.ix_(within_wider, within_wider)]
-        factor = cho_factor(layout.conditioned(whole))
+        try:
+            factor = cho_factor(layout.conditioned(whole))
+        except np.linalg.LinAlgError:  # rounding hides what a mode would add
+            return
         shared = shared + precision[np.ix_(within_wider, weights)]
         own = layout.conditioned(own + precision[np.ix_(weights, weights)])
         alone = cho_solve(factor, self._right - apart[within_wider])

@@ -256,12 +256,12 @@ def noise_of(signal: Array) -> float:
     """Standard deviation of the white noise in a signal, from third differences.
 
     Their variance is 1 + 9 + 9 + 1 times that of the noise, and the median of the absolute value of
-    a normal variable is its standard deviation over 1.4826. A signal of no noise has that of
-    rounding to a float of single precision.
+    a normal variable is its standard deviation over 1.4826. A signal of no noise has that of the
+    finest converters, which resolve 20 bits of it.
     """
     third = np.diff(signal, 3)
     robust = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
-    return float(max(robust, float(np.finfo(np.float32).eps) * float(np.ptp(signal))))
+    return float(max(robust, 2.0**-20 * float(np.ptp(signal))))
 
 
 def correlation_length(residual: Array) -> float:

@@ -47,3 +47,22 @@ def test_slow_loops_are_predicted_as_they_were_read(tmp_path: Path, *, after: bo
     assert np.std(missed) < 3.0 * NOISE
     longer = recorded(np.tile(loops(95, 45, 75, 15), 3), after=after, seed=7)
     assert afm.diagnose(model, [longer]).verdict == "model_sufficient"
+
+
+def test_a_few_loops_of_unknown_start_are_not_balanced_by_a_lead() -> None:
+    """Lags of negative weights and another hysteresis explained such a record alone."""
+    drive = np.tile(loops(100)[25:], 4)
+    model = afm.identify([recorded(drive, after=True, seed=1)])
+    fresh = recorded(np.tile(loops(100)[25:], 8), after=True, seed=2)
+    missed = model.predict(fresh.drive, PERIOD) - fresh.displacement
+    assert np.std(missed[200:]) < 1e-3 * np.ptp(fresh.displacement)
+
+
+@pytest.mark.parametrize("digits", [6, 9, 17])
+def test_a_record_without_noise_is_identified(digits: int) -> None:
+    """As made by a formula, and written with so many digits."""
+    time = 1e-3 * np.arange(500)
+    drive = 4.0 * np.sin(2.0 * np.pi * 5.0 * time) * np.minimum(1.0, 10.0 * time)
+    seen = np.array([float(f"{value:.{digits}g}") for value in 8e-6 * drive])
+    model = afm.identify([afm.Record(drive, seen, 1e-3)])
+    assert np.std(model.predict(drive, 1e-3).ravel() - seen) < 1e-3 * np.ptp(seen)
