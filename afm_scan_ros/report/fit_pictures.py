@@ -43,8 +43,8 @@ def fit_picture(found: Identification) -> Picture:
     return _rows(
         found,
         "fit",
-        "Left: rms by band of the motion of a record that was not fitted, and of what the model"
-        " leaves of it. Right: what the model leaves of each record.",
+        "Left: rms by band of the motion of a record, if there is one that was not fitted, and of"
+        " what the model leaves of it. Right: what the model leaves of each record.",
         _bands,
         _left,
     )
@@ -139,16 +139,15 @@ def _left(name: str, found: FittedAxis) -> Panel:
 
 
 def _bands(name: str, found: FittedAxis) -> Panel:
-    steps = []
-    for one in found.validations[:1]:
-        known = one.model_discrepancy
-        lines = {
-            "motion": (known.displacement, ORANGE),
-            "left by the model": (known.rms, BLUE),
-            "sensor noise": (known.noise, DARK_GREY),
-        }
-        edges = np.maximum(known.bands, known.bands[1] / 10.0)
-        for label, (rms, colour) in lines.items():
-            shown = NANO * np.where(np.array(rms) >= min(known.noise), rms, np.nan)
-            steps.append(Steps(edges, shown, label, colour))
-    return Panel(steps, HERTZ, "rms in nm", f"{name}: held out, rms by band", "xy")
+    known = found.model.model_discrepancies[0]
+    lines = {
+        "motion": (known.displacement, ORANGE),
+        "left by the model": (known.rms, BLUE),
+        "sensor noise": (known.noise, DARK_GREY),
+    }
+    edges, steps = np.maximum(known.bands, known.bands[1] / 10.0), []
+    for label, (rms, colour) in lines.items():
+        shown = NANO * np.where(np.array(rms) >= min(known.noise), rms, np.nan)
+        steps.append(Steps(edges, shown, label, colour))
+    which = "fitted" if known.fitted else "held out"
+    return Panel(steps, HERTZ, "rms in nm", f"{name}: {which}, rms by band", "xy")
