@@ -33,7 +33,7 @@ def test_the_noise_of_a_measured_drive_is_found(seed: int, share: float) -> None
     drive, sigma = ramps(seed), share * LIMIT
     noise = sigma * np.random.default_rng(seed + 1).standard_normal(len(drive))
     found = white_noise_of(drive + noise, SETTINGS)
-    assert found == pytest.approx(sigma, rel=0.4)  # a third of the windows hold a turn
+    assert found == pytest.approx(sigma, rel=0.5)  # a third of the windows hold a turn
 
 
 @given(SEEDS, st.floats(0.05, 0.7))
