@@ -168,9 +168,10 @@ def _applied(
 def synchronised(model: ScannerModel, record: Record) -> Record:
     """Return a record as one of a displacement that is read just before the drive's updates.
 
-    Nodes read so; other records are read as those were that a model was identified from.
+    It was read as those were that the model was identified from. A drive that is not held has no
+    updates.
     """
-    if record.scan is not None or record.intersample != HELD:
+    if record.intersample != HELD:
         return record
     drive = record.drive.copy()
     for channel, axis in enumerate(record.axes):

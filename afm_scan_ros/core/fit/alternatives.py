@@ -108,17 +108,24 @@ def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit, or one without lags where these are all that there is of its vibration.
 
     They stay where they have clearly the greater evidence, for loops of one rate look like a lag,
-    and where they are hidden between samples: there the model leaves them out. A lead is none of a
-    scanner, and hysteresis that was fitted beside it is another one, so that it is fitted anew.
+    and where they are hidden between samples: there the model leaves them out.
     """
-    if fit.leads:
-        fit = without_lags(fit)
-        progress("fitting without a lead")
-        settle(fit, fit.layout.settings.most_steps, searching=True)
-        return fit
     if not fit.lags_alone or fit.hidden_lag:
         return fit
     return _preferred(without_lags(fit), lambda: fit, progress, "a lag of the vibration")
+
+
+def without_lead(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = ()) -> AxisFit:
+    """Return a fit without lags where these lead by more than the fastest one is long.
+
+    No scanner leads. Its model has no lags then, and what was fitted beside them is fitted anew.
+    """
+    if not fit.lags_alone or fit.mean_lag > -float(fit.layout.lags[0]):
+        return fit
+    progress("fitting without a lead")
+    fit = without_lags(fit)
+    settle(fit, fit.layout.settings.most_steps, groups, searching=True)
+    return fit
 
 
 def without_lags(fit: AxisFit) -> AxisFit:

@@ -6,12 +6,14 @@ from copy import copy
 import numpy as np
 from attrs import evolve
 
+from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.alternatives import (
     better,
     with_rest,
     with_told_lags,
     with_told_reading,
+    without_lead,
 )
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
 from afm_scan_ros.core.fit.directions import lost_by
@@ -22,7 +24,7 @@ from afm_scan_ros.core.fit.modes import add_first_mode, add_mode
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.signals import in_step, signals_of
+from afm_scan_ros.core.fit.signals import signals_of, steps_read_after
 from afm_scan_ros.core.intersample import held_voltages
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
@@ -89,7 +91,7 @@ def fit_axis(
             break
         progress("fitting a further mode")
         settle(fit, settings.most_steps, VIBRATION)
-    fit = with_told_lags(fit, progress)
+    fit = with_told_lags(without_lead(fit, progress), progress)
     if len(fit.layout.lacking(fit.theta)[1]):
         progress("holding the hysteresis to its conditions")
         fit = _held_to_growth(fit)
@@ -105,6 +107,7 @@ def _of_linear(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
         if not (fit.find_tones() or add_mode(fit)):
             break
         progress("fitting a further mode")
+    fit = without_lead(fit, progress, LINEAR)
     if not fit.converged:
         progress(f"not converged: {fit.remaining:.3g} nat may remain")
     return fit
@@ -149,14 +152,19 @@ def started(
     A ``linear`` scanner remembers no drive before its records but by its lags and creep.
     """
     given = [record.axis(axis) for record in records if axis in record.axes]
-    drives = [held_voltages(in_step(one, settings), one.intersample) for one in given]
+    ahead = [steps_read_after(one, settings) for one in given]
+    voltages = [
+        led(one.drive[:, 0]) if after else one.drive[:, 0]
+        for one, after in zip(given, ahead, strict=True)
+    ]
+    pairs = zip(voltages, given, strict=True)
+    drives = [held_voltages(drive, one.intersample) for drive, one in pairs]
     operator = Plays(*_range_of(drives, settings), settings)
     if operator.half == 0.0:
         raise InputError(f"no record moves {axis}: give one whose drive changes")
-    pairs = zip(given, drives, strict=True)
     signals = [
-        signals_of(record, drive, operator.half, settings, remembers=not linear)
-        for record, drive in pairs
+        evolve(signals_of(one, drive, operator.half, settings, remembers=not linear), ahead=after)
+        for one, drive, after in zip(given, drives, ahead, strict=True)
     ]
     begun = [k for k, one in enumerate(signals) if not (linear or one.rested or one.first)]
     for place, k in enumerate(begun):

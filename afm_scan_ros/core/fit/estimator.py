@@ -126,11 +126,6 @@ class AxisFit:
         return self.lags_alone and self.mean_lag < self.shortest
 
     @property
-    def leads(self) -> bool:
-        """Whether the response is ahead of the drive by more than the fastest lag is long."""
-        return self.lags_alone and self.mean_lag < -float(self.layout.lags[0])
-
-    @property
     def mean_lag(self) -> float:
         """Mean of the lags, by their weights, s."""
         return float(self.theta[self.layout.parts["lags"]] @ self.layout.lags)
@@ -296,7 +291,7 @@ class AxisFit:
         for k, left in enumerate(self.residuals()):
             record = self.records[k]
             if record.block == record.upsampling:
-                noise = np.sqrt(record.upsampling) * noise_of(left)
+                noise = np.sqrt(record.upsampling) * noise_of(left, self.layout.settings.finest)
                 record = self.records[k] = evolve(record, noise=noise)
             noise = record.noise**2 / record.block
             parts.append((len(left), float(left @ left), noise, record.motion**2))

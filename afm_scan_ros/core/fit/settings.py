@@ -9,6 +9,12 @@ from afm_scan_ros.core.settings import setting
 class FitSettings:
     """What the fit of an axis resolves, expects beforehand, and takes for significant."""
 
+    finest: float = setting(
+        2.0**-20,
+        "range",
+        "least noise of a signal",
+        "converters resolve up to 20 bits without noise",
+    )
     smallest_play: float = setting(
         1e-3,
         "half range",

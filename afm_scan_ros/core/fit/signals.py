@@ -10,7 +10,7 @@ from scipy.fft import irfft, rfft
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.measured_drive import without_noise
-from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
 from afm_scan_ros.core.intersample import HELD, INTERPOLATION, read_between, upsampling
 from afm_scan_ros.core.record import Record
@@ -185,7 +185,7 @@ def signals_of(
         edge = INTERPOLATION.edge
         known = slice(0 if record.depolarised else every * edge, every * (len(measured) - edge))
         drive, displacement = drive[known], displacement[known]
-    noise = float(np.sqrt(every)) * noise_of(measured)
+    noise = float(np.sqrt(every)) * noise_of(measured, settings.finest)
     block = longest_block(drive, displacement, noise, settings, every)
     first = known_from(drive, settings, depolarised=record.depolarised or not remembers)
     first = first if first < settings.most_left_out * len(drive) else 0
@@ -193,17 +193,7 @@ def signals_of(
     period, begun = record.sample_period / every, record.depolarised
     every_sample = record.name, drive, displacement, period
     held = record.intersample == HELD
-    return Signals(
-        *every_sample,
-        block,
-        first,
-        begun,
-        noise,
-        edges,
-        upsampling=every,
-        held=held,
-        ahead=held and reads_after(record.drive[:, 0], measured, settings),
-    )
+    return Signals(*every_sample, block, first, begun, noise, edges, upsampling=every, held=held)
 
 
 def _later(drive: Array, samples: int) -> Array:
@@ -226,12 +216,15 @@ def edges_of(
     return block * smooth_edges(*both, quiet, half_range, begins, settings)
 
 
-def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> bool:
-    """Whether a displacement follows steps of its drive within their own sample.
+def steps_read_after(record: Record, settings: FitSettings) -> bool:
+    """Whether a record of one axis follows steps of a held drive within their own sample.
 
     Such a displacement was read after the drive's update: just before it, nothing of a step shows
     yet. A step follows a drive that rests. A record is judged where steps are most of its drive.
     """
+    if record.intersample != HELD:
+        return False
+    drive, displacement = record.signals(record.axes[0])
     change, moved = np.diff(drive), np.diff(displacement)
     rests = np.concatenate([[True], change[:-1] == 0.0])
     steps = np.flatnonzero((change != 0.0) & rests)
@@ -240,28 +233,20 @@ def reads_after(drive: Array, displacement: Array, settings: FitSettings) -> boo
     size = float(change[steps] @ change[steps])
     following = np.append(moved[1:], 0.0)
     seen, later = (float(change[steps] @ each[steps]) / size for each in (moved, following))
-    noise = np.sqrt(2.0 / size) * noise_of(displacement)
+    noise = np.sqrt(2.0 / size) * noise_of(displacement, settings.finest)
     return bool(abs(seen) > max(settings.read_after * noise, 0.5 * abs(seen + later)))
 
 
-def in_step(record: Record, settings: FitSettings) -> Array:
-    """Return a drive (V), (n,), of a record of one axis as if that were read before each update."""
-    drive, displacement = record.signals(record.axes[0])
-    if record.intersample != HELD or not reads_after(drive, displacement, settings):
-        return drive
-    return led(drive)
-
-
-def noise_of(signal: Array) -> float:
+def noise_of(signal: Array, finest: float = DEFAULT_SETTINGS.finest) -> float:
     """Standard deviation of the white noise in a signal, from third differences.
 
     Their variance is 1 + 9 + 9 + 1 times that of the noise, and the median of the absolute value of
-    a normal variable is its standard deviation over 1.4826. A signal of no noise has that of the
-    finest converters, which resolve 20 bits of it.
+    a normal variable is its standard deviation over 1.4826. It is at least what the ``finest``
+    converter resolves, as a share of the signal's range: a signal made by a formula has none.
     """
     third = np.diff(signal, 3)
     robust = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
-    return float(max(robust, 2.0**-20 * float(np.ptp(signal))))
+    return float(max(robust, finest * float(np.ptp(signal))))
 
 
 def correlation_length(residual: Array) -> float:

@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
-from afm_scan_ros.core.fit.signals import in_step, known_from, reads_after
+from afm_scan_ros.core.fit.signals import known_from, steps_read_after
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.findings import (
     Finding,
@@ -189,17 +189,19 @@ def _of_scan(model: AxisModel, spread: Spread, fit: AxisFit) -> float:
 
 def _in_step(model: AxisModel, record: Record) -> Record:
     """Return a record of one axis as it were read just before its drive's updates."""
-    if model.reads_after and record.intersample == HELD:
-        return evolve(record, drive=led(record.drive))
-    return evolve(record, drive=in_step(record, DEFAULT_SETTINGS))
+    return evolve(record, drive=led(record.drive)) if _was_read_after(model, record) else record
+
+
+def _was_read_after(model: AxisModel, record: Record) -> bool:
+    if model.reads_after:
+        return record.intersample == HELD
+    return steps_read_after(record, DEFAULT_SETTINGS)
 
 
 def _read_after(model: AxisModel, records: Sequence[Record], axis: str) -> Iterator[Finding]:
     """Yield the records that were read after their drive's updates."""
     for one in records:
-        if one.intersample == HELD and (
-            model.reads_after or reads_after(*one.signals(axis), DEFAULT_SETTINGS)
-        ):
+        if _was_read_after(model, one.axis(axis)):
             yield ReadAfterUpdate(one.name, model.reads_after)
 
 
