@@ -40,3 +40,14 @@ def test_a_stage_that_rings_is_at_no_limit() -> None:
     """A fast move turns at its end while the stage swings back."""
     slipping = record(OPERATORS["plays"], levels(2, 8, 500))
     assert not list(saturation_problems("x", *slipping.signals("x")))
+
+
+def test_a_branch_that_only_goes_back_from_an_end_says_nothing_of_it() -> None:
+    """The first loop comes from the middle; a play stands still behind its turn at the top."""
+    corners = np.array([0.4, 1.0, -1.0, 0.6, -0.6, 0.6])
+    drive = np.interp(np.linspace(0.0, 5.0, 2000), np.arange(6), corners)
+    held, moved = 0.0, np.empty(len(drive))
+    for k, volts in enumerate(drive):
+        held = min(max(held, volts - 0.2), volts + 0.2)
+        moved[k] = 1e-6 * held
+    assert not list(saturation_problems("x", drive, moved))

@@ -181,9 +181,10 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
     What is at its limit stands still while the drive comes there and while it goes back, for it
     has no memory. Hysteresis bends the two ways apart: it flattens one at most, and loses heat only
     where the other is the steeper. So the steeper way counts, beside the mean slope of the same
-    branches. Branches are compared that cover much of the range, as every branch is flat, or
-    steep, where it has just turned. A drive of few steps has no slopes, a ramp but one end. Where
-    the displacement goes against its drive the stage follows late, or rings.
+    branches, and a branch that goes back tells nothing alone. Branches are compared that cover much
+    of the range, as every branch is flat, or steep, where it has just turned. A drive of few steps
+    has no slopes, a ramp but one end. Where the displacement goes against its drive the stage
+    follows late, or rings.
     """
     slow = np.corrcoef(drive, displacement)[0, 1] > SLOW
     if not slow or np.mean(np.diff(drive) != 0.0) < 0.5:  # noqa: PLR2004 - most of the time
@@ -200,7 +201,10 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
 
 
 def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
-    """Slopes where the drive is ``there``, over the mean: of branches that come, and that go."""
+    """Slopes where the drive is ``there``, over the mean: of branches that come, and that go.
+
+    None where no branch comes.
+    """
     turns = np.concatenate([[0], turning_points(drive), [len(drive) - 1]])
     first, last = turns[:-1], turns[1:]
     long = np.abs(drive[last] - drive[first]) > FAR * np.ptp(drive)
@@ -214,8 +218,9 @@ def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
             near.append(within[:, -1] - within[:, 0])
             noise = float(np.std(detrend(within[1])))
             whole += both[:, -1] - both[:, 0]
-        if near and np.sum(near, axis=0)[0] != 0.0:
-            found.append(float(_most(np.array(near), noise) * whole[0] / whole[1]))
+        if not near or np.sum(near, axis=0)[0] == 0.0:
+            break
+        found.append(float(_most(np.array(near), noise) * whole[0] / whole[1]))
     return found
 
 
