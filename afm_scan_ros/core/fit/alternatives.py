@@ -80,9 +80,9 @@ def with_rest(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = 
 def with_told_reading(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Return a fit whose records were read after their drives' updates, where these show it.
 
-    Without any lag such a fit has to explain as much as one of lags that reads before the updates,
-    or clearly more where the lag of that one is one: a negative lag is none of a scanner. A fit of
-    modes is as good either way, and records of drives that are not held have no updates.
+    Without any lag such a fit has to explain clearly more than one of lags that reads before the
+    updates. A fit of modes is as good either way, and records of drives that are not held have no
+    updates.
     """
     if all(one.ahead for one in fit.records):
         return read_after(fit)
@@ -93,8 +93,7 @@ def with_told_reading(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     before.records = list(fit.records)
     after = partial(read_after, without_lags(fit))
     _, lead = _compared(before, after, progress, name, groups)
-    chance = fit.layout.settings.mode_chance
-    return read_after(fit) if lead > np.copysign(chance, before.mean_lag) else fit
+    return read_after(fit) if lead > fit.layout.settings.mode_chance else fit
 
 
 def read_after(fit: AxisFit) -> AxisFit:
@@ -118,14 +117,19 @@ def with_told_lags(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
 def without_lead(fit: AxisFit, progress: ProgressCallback, groups: Sequence[str] = ()) -> AxisFit:
     """Return a fit without lags where these lead by more than the fastest one is long.
 
-    No scanner leads. Its model has no lags then, and what was fitted beside them is fitted anew.
+    No scanner leads. It is read after the updates where that explains more, and what was fitted
+    beside the lags is fitted anew.
     """
     if not fit.lags_alone or fit.mean_lag > -float(fit.layout.lags[0]):
         return fit
     progress("fitting without a lead")
-    fit = without_lags(fit)
-    settle(fit, fit.layout.settings.most_steps, groups, searching=True)
-    return fit
+    plain = without_lags(fit)
+    settle(plain, fit.layout.settings.most_steps, groups, searching=True)
+    if fit.layout.reads_after or not all(one.held for one in fit.records):
+        return plain
+    name = "reading after the drive's updates"
+    other, lead = _compared(plain, partial(read_after, plain), progress, name, groups)
+    return other if lead > 0.0 else plain
 
 
 def without_lags(fit: AxisFit) -> AxisFit:
