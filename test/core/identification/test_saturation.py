@@ -51,3 +51,10 @@ def test_a_branch_that_only_goes_back_from_an_end_says_nothing_of_it() -> None:
         held = min(max(held, volts - 0.2), volts + 0.2)
         moved[k] = 1e-6 * held
     assert not list(saturation_problems("x", drive, moved))
+
+
+def test_a_limit_is_found_where_a_long_branch_only_goes_back_from_it() -> None:
+    """The top is reached by a short branch; what goes back from it stands still as no other."""
+    drive = np.interp(np.linspace(0.0, 5.0, 2000), np.arange(6), [0.7, 1.0, -1.0, 0.6, -0.6, 0.6])
+    (message,) = saturation_problems("x", drive, np.minimum(drive, 0.9))
+    assert "saturates: at the top" in message

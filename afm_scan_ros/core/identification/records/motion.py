@@ -1,7 +1,7 @@
 """Whether a displacement is the answer to its drive: of this axis, in step, and not at a limit."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import permutations, product
+from itertools import pairwise, permutations, product
 from typing import TypeAlias
 
 import numpy as np
@@ -181,10 +181,10 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
     What is at its limit stands still while the drive comes there and while it goes back, for it
     has no memory. Hysteresis bends the two ways apart: it flattens one at most, and loses heat only
     where the other is the steeper. So the steeper way counts, beside the mean slope of the same
-    branches, and a branch that goes back tells nothing alone. Branches are compared that cover much
-    of the range, as every branch is flat, or steep, where it has just turned. A drive of few steps
-    has no slopes, a ramp but one end. Where the displacement goes against its drive the stage
-    follows late, or rings.
+    branches. Branches are compared that cover much of the range, as every branch is flat, or
+    steep, where it has just turned: those that only go back from an end are compared with the
+    beginnings of others. A drive of few steps has no slopes, a ramp but one end. Where the
+    displacement goes against its drive the stage follows late, or rings.
     """
     slow = np.corrcoef(drive, displacement)[0, 1] > SLOW
     if not slow or np.mean(np.diff(drive) != 0.0) < 0.5:  # noqa: PLR2004 - most of the time
@@ -201,27 +201,43 @@ def saturation_problems(axis: str, drive: Array, displacement: Array) -> Iterato
 
 
 def _slopes(drive: Array, displacement: Array, there: Mask) -> list[float]:
-    """Slopes where the drive is ``there``, over the mean: of branches that come, and that go.
+    """Slopes where the drive is ``there``, over the usual ones: of branches that come, and that go.
 
-    None where no branch comes.
+    None where no branch goes there whose slope could be usual.
     """
     turns = np.concatenate([[0], turning_points(drive), [len(drive) - 1]])
-    first, last = turns[:-1], turns[1:]
-    long = np.abs(drive[last] - drive[first]) > FAR * np.ptp(drive)
+    both = np.stack((drive, displacement))
+    long = [
+        (both[:, m : n + 1], there[m : n + 1])
+        for m, n in pairwise(turns)
+        if abs(drive[n] - drive[m]) > FAR * np.ptp(drive)
+    ]
+    coming, going = (
+        [(branch, branch[:, here]) for branch, here in long if here[end] and not here[~end]]
+        for end in (-1, 0)
+    )
+    if coming:
+        usual = [_ways([branch for branch, _ in each]) for each in (coming, going)]
+    else:
+        usual = [_ways([]), _ways([_begun(branch, drive) for branch, here in long if not here[0]])]
     found = []
-    for inward, outward in ((there[last], there[first]), (there[first], there[last])):
-        chosen = long & inward & ~outward
-        near, whole, noise = [], np.zeros(2), 0.0
-        for m, n in zip(first[chosen], last[chosen], strict=True):
-            both = np.stack((drive[m : n + 1], displacement[m : n + 1]))
-            within = both[:, there[m : n + 1]]
-            near.append(within[:, -1] - within[:, 0])
-            noise = float(np.std(detrend(within[1])))
-            whole += both[:, -1] - both[:, 0]
-        if not near or np.sum(near, axis=0)[0] == 0.0:
-            break
-        found.append(float(_most(np.array(near), noise) * whole[0] / whole[1]))
+    for branches, ways in zip((coming, going), usual, strict=True):
+        ends = [end for _, end in branches]
+        if np.sum(_ways(ends)[:, 0]) > 0.0 and np.all(np.sum(ways, axis=0) != 0.0):
+            noise = float(np.std(detrend(ends[-1][1])))
+            found.append(float(_most(_ways(ends), noise) * np.divide(*np.sum(ways, axis=0))))
     return found
+
+
+def _ways(branches: list[Array]) -> Array:
+    """How far the drive (V) went along each branch and the displacement (m) with it, (n, 2)."""
+    ways = np.array([branch[:, -1] - branch[:, 0] for branch in branches]).reshape(-1, 2)
+    return np.asarray(ways * np.sign(ways[:, :1]))
+
+
+def _begun(branch: Array, drive: Array) -> Array:
+    """Return a branch, (2, n), as far from its turn as the end of a range is wide."""
+    return branch[:, np.abs(branch[0] - branch[0, 0]) < END * np.ptp(drive)]
 
 
 def _most(ways: Array, noise: float) -> float:
