@@ -37,6 +37,10 @@ class Listener(Node):
         self.create_subscription(topic.kind, topic.name, self.lines.append, topic.reader)
         self.create_subscription(NODE_STATE.kind, NODE_STATE.name, self._hear, NODE_STATE.reader)
 
+    def heard(self, said: str) -> bool:
+        """Whether the monitor has said something."""
+        return any(reason.startswith(said) for _, reason in self.said)
+
     def _hear(self, message: Message) -> None:
         if message.node == NAME:
             self.said.append((message.state, message.reason))
@@ -63,15 +67,18 @@ def scan(spec: Path, listener: Listener, start: Callable[..., NodeProcess]) -> S
     def run(plant: Path, model: Path = CONFIG / "model.yaml", watchers: int = 1) -> object:
         required = ["inversion_compensator", "piezoscanner_sim"]
         sim = {"plant_file": str(plant), "min_subscriptions": watchers}
+        source = {"required_nodes": required, "time_scale": 0.0, "min_subscriptions": 1}
         nodes = [
             start(NAME, model_file=str(model), min_subscriptions=1, **PACE),
+            start("trajectory_generator", spec, **source, **PACE),
+        ]
+        # The scan waits for its own nodes, and not until a viewer knows of it and is known.
+        knows = "waits for one publisher"
+        until(lambda: listener.heard(knows) or nodes[0].process.poll() is not None, listener)
+        nodes += [
             start("piezoscanner_sim", **sim, min_true_subscriptions=0, **PACE),
             start("inversion_compensator", min_subscriptions=1 + watchers, **PACE),
         ]
-        # The scan waits for its own nodes, and not until a viewer knows them.
-        until(lambda: listener.count_publishers(MODEL_RESIDUAL.name), listener)
-        source = {"required_nodes": required, "time_scale": 0.0, "min_subscriptions": 1}
-        nodes.append(start("trajectory_generator", spec, **source, **PACE))
         until(lambda: all(node.process.poll() is not None for node in nodes), listener)
         return {node.name: node for node in nodes}
 
