@@ -11,7 +11,7 @@ from attrs import evolve
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.fit.delays import by_whole_samples, read_late
-from afm_scan_ros.core.fit.descent import LINEAR, settle
+from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
 from afm_scan_ros.core.fit.one_state import OneState
@@ -312,8 +312,18 @@ def _held_with(fit: AxisFit, found: FoundMode) -> AxisFit:
     return other
 
 
+def _without_creep(fit: AxisFit) -> AxisFit:
+    """Return a fit without creep: that of plays may be what plays lack where rates differ too."""
+    other = copy(fit)
+    other.records, other.theta = list(fit.records), fit.theta.copy()
+    other.theta[fit.layout.parts["creep"]] = 0.0
+    groups = (*fit.layout.operator.parts, *VIBRATION, "rest", "memory")
+    settle(other, fit.layout.settings.stage_steps, groups)
+    return other
+
+
 def with_one_state(fit: AxisFit) -> AxisFit:
-    """Return the fit with the operator of one state that follows its F best.
+    """Return the fit with the operator of one state that follows best the F of plays without creep.
 
     One state forgets where it began only little by little, at no turn of the drive, so each record
     that did not rest has a memory of its own. Where its path begins the plays do not say, for the
@@ -321,6 +331,7 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     measured drives lose their noise. What vibrates is sought anew: it may have taken what plays
     cannot do.
     """
+    fit = _without_creep(fit)
     layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
     quiet = [one.without_drive_noise(layout.operator.half, layout.settings) for one in fit.records]
     records, resting = each_of_own_start(quiet), begun_at_rest(fit, range(len(fit.records)))
