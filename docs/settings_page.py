@@ -7,6 +7,7 @@ from attrs import fields
 from afm_scan_ros.core.diagnosis.settings import (
     DecimationSettings,
     PartingSettings,
+    PosteriorSettings,
     StructureSettings,
 )
 from afm_scan_ros.core.extension import ExtensionSettings
@@ -22,6 +23,7 @@ SETTINGS: tuple[type, ...] = (
     IntersampleSettings,
     PartingSettings,
     DecimationSettings,
+    PosteriorSettings,
     StructureSettings,
     ExtensionSettings,
     DrawingSettings,

@@ -77,6 +77,18 @@ def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:
     return float(np.linalg.norm(spread.shares * rms_by_band(moved, spread.bands, sample_period)))
 
 
+def varied(axis: AxisModel, variant: Variant) -> AxisModel:
+    """Return an axis with the effects of a variant, and without any that was added to it."""
+    return evolve(
+        axis,
+        hysteresis=evolve(axis.hysteresis, forward=variant.forward, output=variant.output),
+        vibration=variant.vibration,
+        creep=variant.creep,
+        sensor=variant.sensor,
+        added=(),
+    )
+
+
 def _moved(
     axis: AxisModel,
     variant: Variant,
@@ -85,15 +97,7 @@ def _moved(
     share: float,
     intersample: str,
 ) -> Array:
-    other = evolve(
-        axis,
-        hysteresis=evolve(axis.hysteresis, forward=variant.forward, output=variant.output),
-        vibration=variant.vibration,
-        creep=variant.creep,
-        sensor=variant.sensor,
-        added=(),
-    )
-    wider = extended_axis(other, held_voltages(drive, intersample), share)
+    wider = extended_axis(varied(axis, variant), held_voltages(drive, intersample), share)
     return moved_by(partial(forward, wider), drive, sample_period, intersample)
 
 

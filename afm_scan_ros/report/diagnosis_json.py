@@ -10,7 +10,6 @@ import numpy as np
 
 from afm_scan_ros.core.closed_loop import FIRST, Round
 from afm_scan_ros.core.comparison import ScanComparison, rms_of
-from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
@@ -43,9 +42,8 @@ def account_document(found: ResidualReport) -> Document:
             axis: _likelihood(diagnosed.selection)
             for axis, diagnosed in found.diagnosis.by_axis.items()
         },
-        "base_parameters": {
-            axis: [_base_parameter(*each) for each in diagnosed.moved]
-            for axis, diagnosed in found.diagnosis.by_axis.items()
+        "model_deviations": {
+            axis: list(diagnosed.deviations) for axis, diagnosed in found.diagnosis.by_axis.items()
         },
         "refitted": {
             axis: dict(diagnosed.selection.refitted)
@@ -185,16 +183,6 @@ def _fit(found: FittedCandidates | None) -> Document:
         "log_likelihood": found.cells.log_likelihood,
         "log_base": found.cells.log_base,
         "cell_rms_m": np.sqrt(found.cells.power).tolist(),
-    }
-
-
-def _base_parameter(found: BaseParameter, deviations: float) -> Document:
-    return {
-        "name": found.name,
-        "unit": found.unit,
-        "value": found.value,
-        "moved_to": found.value + deviations * found.deviation,
-        "standard_deviations": deviations,
     }
 
 

@@ -17,9 +17,9 @@ import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.base_parameters import BaseParameter, with_base_parameters
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.free_directions import with_free_directions
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
@@ -31,7 +31,7 @@ from afm_scan_ros.core.effects.residual_features import ResidualFeatures, promin
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback, floats
 
 ALONG = TYPICAL_SHARE / FREEDOM
 """Power of a healthy residual along one influence, in detection limits squared."""
@@ -122,8 +122,7 @@ class AxisDiagnosis:
 
     ``held_out`` has their values fitted to every other stretch of the records. The stretches
     between give the residual on data that the fit did not see. ``time_varying`` are the places of
-    selected effects whose amount changes over the records. ``base_parameters`` are those of the
-    model that are free in every hypothesis.
+    selected effects whose amount changes over the records.
     """
 
     axis: str
@@ -133,7 +132,6 @@ class AxisDiagnosis:
     held_out: Chain
     selection: Selection
     time_varying: tuple[int, ...]
-    base_parameters: tuple[BaseParameter, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -182,10 +180,9 @@ class AxisDiagnosis:
         return self.extended if self.verdict in (FOUND, AMBIGUOUS) else self.chain
 
     @property
-    def moved(self) -> tuple[tuple[BaseParameter, float], ...]:
-        """Free base parameters, and their standard deviations from the model's values."""
-        deviations = self.selection.reached.deviations
-        return tuple(zip(self.base_parameters, deviations.tolist(), strict=True))
+    def deviations(self) -> tuple[float, ...]:
+        """Standard deviations by which the model's free directions were moved."""
+        return floats(self.selection.reached.deviations)
 
     @property
     def ratio_before(self) -> tuple[Array, ...]:
@@ -239,13 +236,13 @@ def diagnose_axis(
     """
     chain = chain_of(model.axis(axis))
     given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
-    free, evidence = ((), tuple(given)) if structure else with_base_parameters(given, chain)
+    evidence = tuple(given) if structure else with_free_directions(given, chain)
     nuisance = (refit_of(model.axis(axis)),) if structure else ()
     search = partial(_search, chain=chain, progress=progress, nuisance=nuisance)
     fresh = tuple(each.from_depolarised(chain) for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
-        return _diagnosed(axis, search(evidence), free)
-    return _diagnosed(axis, _likelier([search(each) for each in (evidence, fresh)]), free)
+        return _diagnosed(axis, search(evidence))
+    return _diagnosed(axis, _likelier([search(each) for each in (evidence, fresh)]))
 
 
 def _search(
@@ -269,7 +266,7 @@ def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:
     return max(searches, key=lambda each: each.selection.posterior.evidence)
 
 
-def _diagnosed(axis: str, search: ModelSearch, free: tuple[BaseParameter, ...]) -> AxisDiagnosis:
+def _diagnosed(axis: str, search: ModelSearch) -> AxisDiagnosis:
     selection, fitter = search.select(), search.fitter
     selected, chain = selection.selected, fitter.chain
     return AxisDiagnosis(
@@ -280,7 +277,6 @@ def _diagnosed(axis: str, search: ModelSearch, free: tuple[BaseParameter, ...]) 
         held_out=fitter.on_fitted_stretches(selected) if selected else chain,
         selection=selection,
         time_varying=tuple(_time_varying(fitter.evidence, chain, selected)),
-        base_parameters=free,
     )
 
 

@@ -95,7 +95,7 @@ class CellFit:
 
     ``freedom`` (cells,) are the amplitudes of the residual, ``known`` (cells,) those from which the
     variance is known. ``log_likelihood`` is in nats, relative to that of a residual of zero without
-    an effect. ``deviations`` (m,) are those of the free base parameters, and ``log_base`` is what
+    an effect. ``deviations`` (m,) are those of the free directions, and ``log_base`` is what
     they cost of it.
     """
 
@@ -113,7 +113,7 @@ class CellFit:
     ) -> "CellFit":
         """Fit of a residual where effects have ``added`` a displacement, both mean squares in m².
 
-        ``least`` is the variance without that of an effect's inexact formula. No base parameter is
+        ``least`` is the variance without that of an effect's inexact formula. No direction is
         free.
         """
         variances = [least + share**2 * added for share in FORMULA_ERRORS]
@@ -267,7 +267,7 @@ class Likelihood:
         return np.concatenate([each.cells.power(coefficients) for each, coefficients in pairs])
 
     def _linear(self, power: Array, left: Sequence[Array]) -> LinearResidual:
-        """Residuals of coefficients (k,), mean squares ``power``, linear in the base parameters."""
+        """Residuals of coefficients (k,), mean squares ``power``, linear in the deviations."""
         slope = [
             e.cells.products(moved, coefficients[np.newaxis])
             for e, moved, coefficients in zip(self.evidence, self._influences, left, strict=True)
@@ -276,7 +276,7 @@ class Likelihood:
 
     @cached_property
     def _influences(self) -> list[Array]:
-        """Coefficients of the displacement by the free base parameters, of each record."""
+        """Coefficients of the displacement by the free directions, of each record."""
         return [each.cells.along(each.base) for each in self.evidence]
 
     @cached_property

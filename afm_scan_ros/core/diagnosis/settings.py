@@ -82,6 +82,21 @@ PARTING = PartingSettings()
 
 
 @frozen
+class PosteriorSettings:
+    """Which directions of the model's posterior are free."""
+
+    negligible: float = setting(
+        0.01,
+        "1",
+        "information of the records on a direction over its prior's, below which it is held",
+        "free, it would change a likelihood by less than a hundredth of a nat",
+    )
+
+
+POSTERIOR = PosteriorSettings()
+
+
+@frozen
 class StructureSettings:
     """Up to what a model counts as exact where its structure is traced."""
 

@@ -1,4 +1,4 @@
-"""Base parameters are free within the intervals of the model, in every hypothesis."""
+"""The directions of a model's spread are free in every hypothesis."""
 
 from functools import cache, partial
 
@@ -12,22 +12,21 @@ from scipy.optimize import minimize
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, SUFFICIENT, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.base_parameters import with_base_parameters
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
-from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import BaseRidge
+from afm_scan_ros.core.diagnosis.free_directions import with_free_directions
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood, LinearResidual, Outside
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, log_density, weights
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
-from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
-from afm_scan_ros.core.model import AxisModel, BaseEffects, EffectStatus, ParameterInterval
+from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import ALL, default_model, scan
+from helpers.spreads import known
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
@@ -37,16 +36,11 @@ SIZED = st.floats(0.1, 30.0)
 SETTLED = 20_000
 
 
-def known(axis: AxisModel, width: float) -> AxisModel:
-    """A model that knows creep's first gain and the resonance within shares of their values."""
-    creep, omega = axis.creep.gains[0], first_resonance(axis.vibration).frequency
-    ends = {"gain_1": (creep, width, "1"), "resonance": (omega, 0.01 * width, "Hz")}
-    one, other = (
-        (ParameterInterval(name, unit, value * (1.0 - share), value * (1.0 + share)),)
-        for name, (value, share, unit) in ends.items()
-    )
-    effects = BaseEffects(EffectStatus(intervals=one), vibration=EffectStatus(intervals=other))
-    return evolve(axis, effects=effects)
+def creep_alone(width: float) -> AxisModel:
+    """A model that knows all but creep's gains."""
+    axis = known(CHAIN.model, width)
+    assert axis.spread is not None
+    return evolve(axis, spread=evolve(axis.spread, directions=axis.spread.directions[:1]))
 
 
 def answer(chain: Chain, drive: Array) -> Array:
@@ -73,7 +67,7 @@ def diagnosed(width: float, record: Record) -> AxisDiagnosis:
     return diagnose(model, [record]).by_axis["x"]
 
 
-FACTOR, WIDE = 2.0, 1.96
+FACTOR, WIDE = 2.0, 1.0
 
 
 @pytest.mark.evidence
@@ -81,13 +75,12 @@ def test_an_error_that_the_model_admits_is_no_effect() -> None:
     """One standard deviation of a wide interval, against many of a narrow one."""
     admitted, denied = (diagnosed(width, recorded(FACTOR)) for width in (WIDE, 1e-3))
     assert admitted.verdict == SUFFICIENT
-    ((gain, deviations),) = ((p, d) for p, d in admitted.moved if p.name == "gain_1")
-    assert gain.value + deviations * gain.deviation == pytest.approx(FACTOR * gain.value, rel=0.2)
+    assert admitted.deviations[0] == pytest.approx((FACTOR - 1.0) / WIDE, rel=0.2)
     assert denied.verdict in (FOUND, AMBIGUOUS)
     assert denied.selection.posterior.of_effect("parameter_shift") > 0.1
 
 
-def test_an_effect_is_named_beside_a_wide_base_parameter() -> None:
+def test_an_effect_is_named_beside_a_wide_direction() -> None:
     late = 2e-4
     found = diagnosed(WIDE, recorded(FACTOR, late))
     assert found.verdict == FOUND
@@ -97,34 +90,32 @@ def test_an_effect_is_named_beside_a_wide_base_parameter() -> None:
     assert abs(selected.fit.values[0] - late) < selected.fit.halfwidth[0]
 
 
-@pytest.mark.parametrize("width", [0.0, None])
+@pytest.mark.parametrize("width", [1e-9, None])
 def test_exact_or_unstated_parameters_change_nothing(width: float | None) -> None:
     axis = default_model().x if width is None else known(default_model().x, width)
-    evidence = [evidence_of("x", default_model(), recorded(FACTOR))]
-    free, same = with_base_parameters(evidence, chain_of(axis))
-    assert free == ()
-    assert same[0] is evidence[0]
+    given = evidence_of("x", default_model(), recorded(FACTOR))
+    (same,) = with_free_directions([given], chain_of(axis))
+    assert len(same.base) == 0
 
 
-def test_a_parameter_is_free_where_the_records_hold_a_hundredth_of_its_information() -> None:
+def test_a_direction_is_free_where_the_records_hold_a_hundredth_of_its_information() -> None:
     seen = evidence_of("x", default_model(), recorded(1.0))
 
-    def free(width: float) -> tuple[list[str], Evidence]:
-        found, (with_base,) = with_base_parameters([seen], chain_of(known(CHAIN.model, width)))
-        return [each.name for each in found], with_base
+    def free(width: float) -> int:
+        (found,) = with_free_directions([seen], chain_of(creep_alone(width)))
+        return len(found.base)
 
-    _, wide = free(1.0)
-    of = seen.variance
+    (wide,) = with_free_directions([seen], chain_of(creep_alone(1.0)))
     moved = seen.cells.power(seen.cells.along(wide.base[:1])[0])
-    told = float(of.weights(0.0 * of.total) @ moved)
-    assert "gain_1" not in free((0.009 / told) ** 0.5)[0]
-    assert "gain_1" in free((0.011 / told) ** 0.5)[0]
+    told = float(seen.variance.weights(0.0 * seen.variance.total) @ moved)
+    assert free((0.009 / told) ** 0.5) == 0
+    assert free((0.011 / told) ** 0.5) == 1
 
 
-def test_every_hypothesis_has_the_base_parameters() -> None:
+def test_every_hypothesis_has_the_free_directions() -> None:
     """An error that they explain makes both no effect and something outside likelier."""
     fixed = evidence_of("x", default_model(), recorded(FACTOR))
-    _, (free,) = with_base_parameters([fixed], chain_of(known(CHAIN.model, WIDE)))
+    (free,) = with_free_directions([fixed], chain_of(known(CHAIN.model, WIDE)))
     less, more = (Likelihood((each,), CHAIN) for each in (fixed, free))
     assert more.fit(CHAIN).log_likelihood > less.fit(CHAIN).log_likelihood + 1.0
     assert more.outside() > less.outside() + 1.0
@@ -140,28 +131,15 @@ def test_every_hypothesis_has_the_base_parameters() -> None:
 def test_the_influence_is_one_standard_deviation_s(place: int, changed: partial[Chain]) -> None:
     """Of creep with one gain."""
     creep = evolve(CHAIN.model.creep, gains=[0.2], time_constants=[2.0])
-    chain = chain_of(known(evolve(CHAIN.model, creep=creep), 0.196))
+    chain = chain_of(known(evolve(CHAIN.model, creep=creep), 0.1))
     record = recorded(1.0)
-    free, (evidence,) = with_base_parameters([evidence_of("x", default_model(), record)], chain)
-    assert [each.name for each in free] == ["gain_1", "resonance"]
+    given = evidence_of("x", default_model(), record)
+    (evidence,) = with_free_directions([given], chain)
     more = answer(changed(chain, 0.1), record.signals("x")[0]) - answer(
         chain, record.signals("x")[0]
     )
     count = evidence.base.shape[1]
     np.testing.assert_allclose(evidence.base[place], more[:count], atol=0.05 * np.abs(more).max())
-
-
-def test_a_lag_is_a_base_parameter() -> None:
-    interval = ParameterInterval("lag", "s", 1e-4, 3e-4)
-    effects = BaseEffects(vibration=EffectStatus(intervals=(interval,)))
-    lagging = evolve(CHAIN.model, vibration=VibrationModel((4e-6,), (4e-4, 2.0)), effects=effects)
-    evidence = [evidence_of("x", default_model(), recorded(1.0))]
-    ((lag,), _) = with_base_parameters(evidence, chain_of(lagging))
-    assert lag.value == pytest.approx(2e-4)
-    assert lag.deviation == pytest.approx(1e-4 / 1.96)
-    late = lag.changed(chain_of(lagging), 3e-4).model.vibration
-    assert late.denominator[0] / late.denominator[1] == pytest.approx(3e-4)
-    assert late.static_gain == pytest.approx(2e-6)
 
 
 def residual(seed: int, size: float, parameters: int = 2) -> LinearResidual:
