@@ -33,19 +33,23 @@ class RecordCells:
     repetition: Repetition | None = None
 
     def repeating(
-        self, drive: Array, rates: Sequence[float], within: tuple[int, int] | None = None
+        self,
+        drive: Array,
+        rates: Sequence[float],
+        within: tuple[int, int] | None = None,
+        *,
+        exact: bool = False,
     ) -> "RecordCells":
         """Return the cells where a drive (n,) repeats at one of some ``rates`` (Hz).
 
-        Rates are exact where the samples ``within`` which it repeats are known. Else they are those
-        of spectral lines, and the one found is refined. The first period has what the approach
-        leaves, so it is left out.
+        It does ``within`` some samples, or in all. The rate found is refined where it is not
+        ``exact``. The first period has what the approach leaves, so it is left out.
         """
         first, last = within or (0, self.count)
         duration = (last - first) * self.sample_period
         tried = [Repetition(first, last, rate * duration) for rate in rates if last > first]
         found = min(tried, key=lambda each: each.share_between(drive), default=None)
-        if found and not within:
+        if found and not exact:
             found = found.refined(drive)
         if found is None or found.share_between(drive) > found.settings.largest_share:
             return self

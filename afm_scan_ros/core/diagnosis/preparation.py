@@ -31,6 +31,7 @@ from afm_scan_ros.core.diagnosis.records import (
 )
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.records.periods import repeated_part
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
@@ -125,14 +126,19 @@ def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 
     if not observed.scan:
         limit = limit.unprepared(len(view.measured) * view.sample_period)
     cells = RecordCells(limit.edges, len(view.drive), view.sample_period)
-    cells = cells.repeating(view.drive, view.rates, _lines(observed))
+    part, exact = _repeated(observed, view.drive), observed.scan is not None
+    cells = cells.repeating(view.drive, view.rates, part, exact=exact)
     return Evidence(playback, limit, untested).with_cells(cells, chain)
 
 
-def _lines(observed: Record) -> tuple[int, int] | None:
-    """Samples from a scan's first line to before the end of its last; None of no scan."""
+def _repeated(observed: Record, drive: Array) -> tuple[int, int] | None:
+    """Samples from a scan's first line to before the end of its last, or where a drive repeats.
+
+    None where no part of a drive does.
+    """
     if observed.scan is None:
-        return None
+        part = repeated_part(drive)
+        return part and part[:2]
     lines, count = phases(observed.scan).lines, fast_length(len(observed.drive))
     return min(lines.start, count), min(lines.stop, count)
 

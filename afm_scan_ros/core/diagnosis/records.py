@@ -13,6 +13,7 @@ from attrs import define, evolve, field, frozen
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
+from afm_scan_ros.core.identification.records.periods import repeated_part
 from afm_scan_ros.core.intersample import HELD, held_voltages, read_between, upsampling
 from afm_scan_ros.core.model import Range
 from afm_scan_ros.core.record import Record
@@ -20,12 +21,19 @@ from afm_scan_ros.core.types import AXES, Array, floats
 
 
 def repetition_rates(record: Record) -> tuple[float, ...]:
-    """Rates (Hz) at which the motion repeats: a scan's line rate, else spectral lines."""
+    """Rates (Hz) at which the motion repeats: a scan's line rate, else the drive's.
+
+    Of a drive that nowhere repeats they are those of its spectral lines.
+    """
     if record.scan:
         lines = record.scan.line_rate
         of_y = (lines * (1.0 - 1.0 / record.scan.lines),)
         return (lines, *(of_y if record.scan.pattern == "lissajous" else ()))
-    lined = (prominent_lines(record.signals(axis)[0], record.sample_period) for axis in AXES)
+    period = record.sample_period
+    drives = [record.signals(axis)[0] for axis in AXES]
+    if found := [part for drive in drives if (part := repeated_part(drive))]:
+        return tuple(1.0 / (samples * period) for _, _, samples in found)
+    lined = (prominent_lines(drive, period) for drive in drives)
     return tuple(rate for found in lined for rate in found)
 
 

@@ -16,10 +16,11 @@ from itertools import pairwise
 import numpy as np
 from attrs import frozen
 from scipy.fft import dct
-from scipy.stats import chi2
+from scipy.stats import chi2, f
 
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import SMALLEST, DetectionLimit
+from afm_scan_ros.core.diagnosis.settings import PARTING
 from afm_scan_ros.core.diagnosis.tones import without_tones
 from afm_scan_ros.core.types import Array
 
@@ -79,7 +80,8 @@ class CellVariance:
         """Return that of a record whose motion repeats, of its predicted motion and residual (n,).
 
         Between the harmonics lies as much of the discrepancy as of the motion, and at least what is
-        seen there of a residual without its tones.
+        seen there of a residual without its tones, up to what the discrepancy of a band hardly ever
+        exceeds: the rest is no error of the model.
         """
         noise, error = _parts(limit)
         along, between = cells.power(cells.coefficients(moved)).reshape(2, cells.bands)
@@ -87,7 +89,9 @@ class CellVariance:
         counts = cells.counts.reshape(2, cells.bands)
         of_motion, of_rest = counts / counts.sum(axis=0) * noise
         power, seen = between_power(cells, residual, of_rest)
-        rest = cls.of_noise(seen, np.maximum(power - seen, shares * error), counts[1], tested)
+        most = error * f.isf(PARTING.false_alarm, FREEDOM, tested)
+        beyond = np.clip(power - seen, shares * error, most)
+        rest = cls.of_noise(seen, beyond, counts[1], tested)
         few = np.ones(cells.bands)
         return cls(
             np.append(of_motion + (1.0 - shares) * error, rest.total),

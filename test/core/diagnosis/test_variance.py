@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import f
 
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
@@ -12,6 +13,7 @@ from afm_scan_ros.core.diagnosis.settings import PARTING
 from afm_scan_ros.core.diagnosis.variance import (
     FREEDOM,
     KNOWN_FREEDOM,
+    TYPICAL_SHARE,
     CellVariance,
     satterthwaite,
 )
@@ -80,3 +82,14 @@ def test_at_rest_all_is_noise_but_what_moves() -> None:
     np.testing.assert_allclose(variance.freedom, cells.counts)
     drifting = CellVariance.at_rest(still, cells, np.linspace(0.0, 3.0, COUNT), KNOWN_FREEDOM)
     assert drifting.freedom[0] < 2.0 * FREEDOM
+
+
+def test_what_exceeds_the_error_of_healthy_records_is_none_of_the_model() -> None:
+    """A gain that wanders lies beside the harmonics, a hundred times the limit."""
+    wander = np.sin(2.0 * np.pi * 7.5 * np.arange(COUNT) / COUNT)
+    variance = found(MOVED * wander + np.random.default_rng(3).standard_normal(COUNT))
+    _, between = variance.total.reshape(2, CELLS.bands)
+    most = TYPICAL_SHARE * 2.0**2 * f.isf(PARTING.false_alarm, FREEDOM, KNOWN_FREEDOM)
+    assert between[0] <= most + PARTING.other_noise**2 * NOISE[0] ** 2
+    power = CELLS.power(CELLS.coefficients(MOVED * wander))[CELLS.bands]
+    assert power > 100.0 * between[0]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
-from afm_scan_ros.core.identification.records.periods import is_periodic, repetition
+from afm_scan_ros.core.identification.records.periods import is_periodic, repeated_part, repetition
 from afm_scan_ros.core.types import Array
 
 
@@ -37,3 +37,30 @@ def test_noise_and_sines_out_of_step_with_the_sampling_have_no_period() -> None:
     noise = np.random.default_rng(0).standard_normal(20_000)
     sine = np.sin(2.0 * np.pi * np.arange(8000) / 100.37)
     assert not any(is_periodic(each[:, np.newaxis]) for each in (noise, sine))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    period=st.floats(100.0, 900.0),
+    cycles=st.floats(5.0, 12.0),
+    shares=st.tuples(st.floats(0.02, 0.4), st.floats(0.02, 0.4)),
+)
+def test_the_part_that_repeats_lies_between_the_ramps_to_it(
+    period: float, cycles: float, shares: tuple[float, float]
+) -> None:
+    """Triangles about 3 V of any length of period, reached from 0 V and left again."""
+    ramps = [int(share * period) for share in shares]
+    count = int(cycles * period)
+    wave = 3.0 + np.interp(np.arange(count) / period % 1.0, [0.0, 0.5, 1.0], [0.0, 1.0, 0.0])
+    up, down = np.linspace(0.0, wave[0], ramps[0]), np.linspace(wave[-1], 0.0, ramps[1])
+    found = repeated_part(np.concatenate([up, wave, down]))
+    assert found is not None
+    first, last, samples = found
+    assert abs(samples - period) <= 1.0
+    assert abs(first - ramps[0]) <= 0.1 * period + 2.0
+    assert abs(last - ramps[0] - count) <= 0.1 * period + 2.0
+
+
+@pytest.mark.parametrize("drive", [np.zeros(500), np.linspace(0.0, 1.0, 500), np.ones(1)])
+def test_a_rest_and_a_ramp_have_no_part_that_repeats(drive: Array) -> None:
+    assert repeated_part(drive) is None

@@ -8,6 +8,8 @@ from afm_scan_ros.core.types import Array
 
 EQUAL = 1e-6
 """Share of the drive's range by which two periods may differ and be equal: rounding, no noise."""
+STEEP = 2.0
+"""Largest step of a part that repeats, over the median of all; a sine's is 1.41."""
 NEAR = 0.05
 """Share of the period by which the peak may be drawn forward: 1/(8 pi^2) of a sine's, thrice."""
 
@@ -46,6 +48,27 @@ def repetition(drive: Array) -> int:
         if _runs(drive, other) and (other < period or not _runs(drive, period)):
             return other
     return period
+
+
+def repeated_part(drive: Array) -> tuple[int, int, int] | None:
+    """Longest part in which a drive, (n,), repeats: first, last and samples of a period.
+
+    A period need not be a whole number of samples, so values may differ by a step of the drive.
+    Those beyond ``STEEP`` count as so large. None of a drive that rests, or that nowhere repeats
+    for two periods.
+    """
+    steps = np.diff(drive)
+    if not steps.any():
+        return None
+    largest = STEEP * float(np.median(np.abs(steps[steps != 0.0])))
+    period = _repetition(np.clip(steps, -largest, largest)[:, np.newaxis])
+    if not 0 < period < len(drive):
+        return None
+    equal = np.abs(drive[period:] - drive[:-period]) <= largest
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]))).reshape(-1, 2)
+    moving = [(a, b + period) for a, b in ends if np.ptp(drive[a : a + period]) > 0.0]
+    first, last = max(moving, key=lambda each: each[1] - each[0], default=(0, 0))
+    return (int(first), int(last), period) if last - first >= 2 * period else None
 
 
 def _repetition(signal: Array) -> int:
