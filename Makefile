@@ -75,7 +75,7 @@ check: docs
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
-	$(VENV)/bin/python -m pytest test/test_docs.py test/test_examples.py
+	$(VENV)/bin/python -m pytest -n 2 test/test_docs.py test/test_examples.py
 
 docs: $(VENV)/ready
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build --strict --quiet

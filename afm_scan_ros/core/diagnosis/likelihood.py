@@ -30,6 +30,7 @@ from scipy.special import logsumexp, softmax
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.settings import POSTERIOR
 from afm_scan_ros.core.diagnosis.variance import log_density, weights
 from afm_scan_ros.core.types import Array
 
@@ -150,6 +151,17 @@ class CellFit:
         """Whether no cell lacks anything."""
         return not self.lacking.any()
 
+    def shape_told(self, power: Array, counts: Array | float) -> float:
+        """Log evidence (nats) for this fit's effects over something of any shape, beyond its size.
+
+        Whatever leaves a mean ``power`` (cells,) has, where this fit leaves less, so many
+        coefficients alike that an unknown shape would have by chance alone. Of their ``counts``
+        (cells,) at most ``POSTERIOR.shape`` are independent.
+        """
+        more = np.maximum(np.minimum(counts, POSTERIOR.shape) - self.freedom, 0.0)
+        fell = np.log1p(power / self.variance) - np.log1p(self.power / self.variance)
+        return max(0.5 * float(np.sum(more * fell)), 0.0)
+
     def outside(self, most: Array) -> float:
         """Log evidence (nats) of something that no effect describes, of up to ``most`` (cells,)."""
         return Outside.beyond(self, most).log_evidence(self.power)
@@ -228,6 +240,11 @@ class Likelihood:
         found = fits[best]
         costs = found.deviations, found.log_base
         return CellFit(found.power, variances[best], known, freedom, mean, *costs)
+
+    @property
+    def counts(self) -> Array:
+        """Number of coefficients (cells,) of each cell."""
+        return np.concatenate([each.cells.counts for each in self.evidence])
 
     def outside(self) -> float:
         """Log evidence (nats) of something that no effect describes, by the residual of the base.

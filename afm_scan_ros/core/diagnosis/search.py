@@ -4,7 +4,7 @@ The forms of an effect are one hypothesis, whose evidence is the sum over its fo
 that a scanner has several times, as two tones.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from attrs import frozen
@@ -19,7 +19,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
 )
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback
 
 NEARLY = 0.01
 """Probability, relative to the most probable set, from which on a set is considered beside it."""
@@ -44,12 +44,17 @@ class Posterior:
 
     @classmethod
     def of(
-        cls, without: FittedCandidates, trials: Iterable[FittedCandidates], outside: float = -np.inf
+        cls,
+        without: FittedCandidates,
+        trials: Sequence[FittedCandidates],
+        outside: float = -np.inf,
+        counts: Array | float = 1.0,
     ) -> "Posterior":
         """Posterior over the model ``without`` an effect and the sets of some trials.
 
         ``outside`` is the log evidence of what no effect describes; a scanner has it as often as
-        one of the catalogue.
+        one of the catalogue. It has a shape of its own, which the likeliest trial tells, of the
+        ``counts`` (cells,) of coefficients.
         """
         by_set: dict[Names, list[FittedCandidates]] = {}
         for trial in trials:
@@ -58,6 +63,9 @@ class Posterior:
         logs: dict[Names, float] = {(): without.log_posterior}
         if np.isfinite(outside):
             logs[OUTSIDE] = outside + LOG_ODDS
+            if trials:
+                likeliest = max(trials, key=lambda trial: trial.log_posterior)
+                logs[OUTSIDE] -= likeliest.cells.shape_told(without.cells.power, counts)
         for names, found in distinct.items():
             logs[names] = float(logsumexp([trial.log_posterior for trial in found]))
         total = float(logsumexp(list(logs.values())))
@@ -195,7 +203,8 @@ class ModelSearch:
     @property
     def selection(self) -> Selection:
         """What was found so far."""
-        posterior = Posterior.of(self._without, self._trials, self._outside)
+        found = self._outside, self.fitter.likelihood.counts
+        posterior = Posterior.of(self._without, self._trials, *found)
         return Selection(self._without, tuple(self._trials), posterior)
 
     def _may_grow(self) -> bool:

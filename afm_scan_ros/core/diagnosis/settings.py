@@ -83,13 +83,20 @@ PARTING = PartingSettings()
 
 @frozen
 class PosteriorSettings:
-    """Which directions of the model's posterior are free."""
+    """Which directions of the model's posterior are free, and what tells an unknown effect."""
 
     negligible: float = setting(
         0.01,
         "1",
         "information of the records on a direction over its prior's, below which it is held",
         "free, it would change a likelihood by less than a hundredth of a nat",
+    )
+
+    shape: float = setting(
+        10.0,
+        "1",
+        "coefficients of a cell, at most, whose agreement tells an effect from what has any shape",
+        "of thousands, which are no independent witnesses where the model errs",
     )
 
 

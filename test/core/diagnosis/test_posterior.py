@@ -12,6 +12,7 @@ from afm_scan_ros.core.diagnosis.candidates import LOG_ODDS, Candidate, FittedCa
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, Posterior
+from afm_scan_ros.core.diagnosis.settings import POSTERIOR
 from afm_scan_ros.core.effects.registry import effect_type
 from helpers.posteriors import no_effect
 
@@ -102,3 +103,18 @@ def test_a_set_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred
     found = Posterior.of(no_effect(fit(-90.0)), [lacking, trial(float(np.log(relative)), LAG)])
     assert next(iter(found.logs)) == ("delay",)
     assert found.likeliest == chosen
+
+
+@given(left=st.floats(1e-3, 1e3), counts=st.floats(1.0, 100.0))
+def test_an_effect_that_tells_the_shape_beats_what_has_any(left: float, counts: float) -> None:
+    """By half a logarithm of what it explains a coefficient; one that explains nothing by none."""
+    whole = trial(0.0, DELAY)
+    cells = evolve(whole.cells, power=np.full(1, left), variance=np.ones(1), freedom=np.ones(1))
+    told = cells.shape_told(np.full(1, 1e3), counts)
+    more = min(counts, POSTERIOR.shape) - 1.0
+    assert told == pytest.approx(0.5 * more * np.log(1001.0 / (1.0 + left)))
+    assert cells.shape_told(np.full(1, 0.5 * left), counts) == 0.0
+    best = evolve(whole, cells=cells)
+    nothing = no_effect(evolve(fit(0.0), power=np.full(1, 1e3)))
+    odds = Posterior.of(nothing, [best], 0.0, counts).logs
+    assert odds[OUTSIDE] - odds["delay",] == pytest.approx(LOG_ODDS - told - best.log_posterior)

@@ -54,9 +54,8 @@ class Foretold(CandidateFitter):
     def __init__(self, left: Left, worse: str = "") -> None:
         super().__init__((), cast("Chain", ()))
         self._left, self._worse = left, worse
-        self.likelihood = cast(
-            "Any", SimpleNamespace(fit=lambda chain: fit(chain, left), outside=lambda: -np.inf)
-        )
+        given = {"fit": lambda chain: fit(chain, left), "outside": lambda: -np.inf}
+        self.likelihood = cast("Any", SimpleNamespace(**given, counts=np.ones(BANDS)))
 
     @property
     def without(self) -> FittedCandidates:  # type: ignore[override]
