@@ -29,7 +29,7 @@ METRES = {"unit": "m"}
 class Figure:
     """An error over a set of samples: rms and largest, in m and as a share of the range.
 
-    The range is the desired peak-to-peak of that axis on the lines.
+    The range is that of the axis in the specification, however much of the scan is there.
     """
 
     rms: float = field(metadata=METRES)
@@ -43,11 +43,14 @@ class Figure:
 class AxisError:
     """The error of one axis. Sets that hold no sample are None.
 
+    ``planned_range`` is the specification's, of which the figures state shares, ``peak_to_peak``
+    what the desired displacement spans on the lines so far.
     ``all``, ``constant_speed`` and ``turnarounds`` leave out the first to-and-fro, which stands
     in ``first_line`` alone; so do ``trace`` (the constant-speed part of all traces) and ``step``
     (the smooth steps of y). ``approach`` and ``preparation`` come before the lines.
     """
 
+    planned_range: float = field(metadata=METRES)
     peak_to_peak: float = field(metadata=METRES)
     all: Figure | None
     constant_speed: Figure | None
@@ -117,7 +120,7 @@ class ErrorSum:
         return sqrt(self.squares / self.count)
 
     def figure(self, full: float) -> Figure | None:
-        """Return the figures for an axis of desired peak-to-peak ``full``; None without samples."""
+        """Return the figures for an axis of the planned range ``full``; None without samples."""
         if not self.count:
             return None
         rms = self.rms()
@@ -213,7 +216,7 @@ class TrackingMeter:
             lines=self._whole_lines(),
             x=self._axis("x", each_x),
             y=self._axis("y", each_y),
-            mismatch=self._lines.mismatch.figure(self._full("x")),
+            mismatch=self._lines.mismatch.figure(self.spec.range_x),
         )
 
     def _whole_lines(self) -> int:
@@ -228,20 +231,15 @@ class TrackingMeter:
         self._lowest[axis] = min(self._lowest[axis], values.min(initial=np.inf))
         self._highest[axis] = max(self._highest[axis], values.max(initial=-np.inf))
 
-    def _full(self, axis: str) -> float:
-        """Return the desired peak-to-peak, m; of the specification as long as no line has begun."""
-        full = float(self._highest[axis] - self._lowest[axis])
-        planned = {"x": self.spec.range_x, "y": self.spec.range_y}[axis]
-        return full if np.isfinite(full) and full > 0.0 else planned
-
     def _axis(self, axis: str, repeatability: float | None) -> AxisError:
-        full = self._full(axis)
+        planned = {"x": self.spec.range_x, "y": self.spec.range_y}[axis]
         figures = {
-            name: error_sum.figure(full)
+            name: error_sum.figure(planned)
             for (of, name), error_sum in self._sums.items()
             if of == axis
         }
-        return AxisError(peak_to_peak=full, repeatability=repeatability, **figures)
+        spanned = max(0.0, float(self._highest[axis] - self._lowest[axis]))
+        return AxisError(planned, spanned, repeatability=repeatability, **figures)
 
 
 def _sets(spec: ScanSpec, run: Trace) -> dict[str, NDArray[np.bool_]]:

@@ -11,7 +11,7 @@ from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report.analysis import Analysis
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
-from afm_scan_ros.report.picture import Picture
+from afm_scan_ros.report.picture import MICRO, Picture
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import Images, image_picture, tracking_picture, view_of
 from afm_scan_ros.report.table import Row, Rows, Table
@@ -19,8 +19,9 @@ from afm_scan_ros.report.whole_scan import whole_pictures
 
 METHOD = (
     "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
-    " is fitted. Its rms is about zero. Percentages are of the axis' desired peak-to-peak. The"
-    " first line, the approach and the preparation are not part of 'all'."
+    " is fitted. Its rms is about zero. Percentages are of the planned range of the axis, which the"
+    " scan's specification states, however much of the scan is there. The first line, the approach"
+    " and the preparation are not part of 'all'."
 )
 
 
@@ -43,10 +44,12 @@ def scan_report(analysis: Analysis, recording: ScanRecording) -> ReportPage:
 def _answer(analysis: Analysis) -> Iterator[str]:
     """Yield the errors on the lines, and with which inverses."""
     tracking = analysis.true or analysis.measured
-    named = {"x at constant speed": tracking.x.constant_speed, "y on trace": tracking.y.trace}
+    x, y = tracking.x, tracking.y
+    named = {"x at constant speed": (x, x.constant_speed), "y on trace": (y, y.trace)}
     errors = [
-        f"{nanometres(error.rms)} nm rms in {name} ({percent(error.rms_share)} % of the range)"
-        for name, error in named.items()
+        f"{nanometres(error.rms)} nm rms in {name} ({percent(error.rms_share)} % of the planned"
+        f" {MICRO * axis.planned_range:g} µm)"
+        for name, (axis, error) in named.items()
         if error is not None
     ]
     if errors:
@@ -81,12 +84,12 @@ def error_tables(analysis: Analysis) -> Iterator[Rows]:
     """Yield the errors of the true displacement, where it is known, and of the measured one."""
     for tracking in (analysis.true, analysis.measured):
         if tracking is not None:
-            title = f"Error of the {tracking.displacement} displacement"
+            title = f"Error of the {tracking.displacement} displacement, % of the planned range"
             yield Rows(HEADINGS, error_rows(tracking), title)
 
 
 def error_rows(tracking: Tracking) -> list[TextRow]:
-    """Return a row for each error; percentages are of the desired peak-to-peak of that axis."""
+    """Return a row for each error; percentages are of the planned range of that axis."""
     x, y = tracking.x, tracking.y
     named = {
         "x, trace minus retrace": tracking.mismatch,
@@ -106,7 +109,7 @@ def error_rows(tracking: Tracking) -> list[TextRow]:
     rows = [_row(name, figure) for name, figure in named.items() if figure is not None]
     for axis, error in (("x", x), ("y", y)):
         if error.repeatability is not None:
-            share = percent(error.repeatability / error.peak_to_peak)
+            share = percent(error.repeatability / error.planned_range)
             name = f"{axis}, line-to-line repeatability"
             rows.append((name, nanometres(error.repeatability), share, "", ""))
     return rows
@@ -115,15 +118,17 @@ def error_rows(tracking: Tracking) -> list[TextRow]:
 def scan_rows(analysis: Analysis) -> list[TextRow]:
     """Return what was scanned, and with what, as names and values."""
     scan, spec, drive = analysis.scan, analysis.scan.spec, analysis.drive
+    done = analysis.measured
     rows: list[TextRow] = [("scan", scan.scan_id), ("pattern", scan.pattern)]
     if spec is not None:
         rows += [
-            ("range", f"{1e6 * spec.range_x:g} µm by {1e6 * spec.range_y:g} µm"),
+            ("planned range", _area(spec.range_x, spec.range_y)),
+            ("desired on the lines", _area(done.x.peak_to_peak, done.y.peak_to_peak)),
             ("line rate", f"{spec.line_rate:g} Hz, {spec.samples_per_line} samples per line"),
-            ("lines", f"{analysis.measured.lines} of {spec.lines}"),
+            ("lines", f"{done.lines} of {spec.lines}"),
         ]
     rows += [
-        ("samples", f"{analysis.measured.samples:,} of {scan.total_samples:,}"),
+        ("samples", f"{done.samples:,} of {scan.total_samples:,}"),
         ("inverses", ", ".join(scan.inverses) or "none"),
         ("model", scan.model_hash[:12] or "none"),
     ]
@@ -133,6 +138,10 @@ def scan_rows(analysis: Analysis) -> list[TextRow]:
             ("drive y", f"{drive.lowest_y:.2f} to {drive.highest_y:.2f} V"),
         ]
     return rows
+
+
+def _area(x: float, y: float) -> str:
+    return f"{MICRO * x:.4g} µm by {MICRO * y:.4g} µm"
 
 
 def _row(name: str, figure: Error) -> TextRow:

@@ -135,6 +135,7 @@ def test_repeatability_is_the_noise_and_not_what_repeats() -> None:
 
 
 def test_a_scan_cut_short_has_the_figures_of_what_is_there() -> None:
+    """Shares are of the planned range, also in y, of which less than a half is reached."""
     stop = LINES.start + 3 * SPEC.samples_per_line + 10
     meter = TrackingMeter(SPEC)
     path = desired(SPEC, 0, stop)
@@ -143,6 +144,10 @@ def test_a_scan_cut_short_has_the_figures_of_what_is_there() -> None:
     assert (tracking.lines, tracking.samples) == (3, stop)
     assert tracking.x.all is not None
     assert tracking.x.all.rms == pytest.approx(1e-9)
+    assert tracking.y.all is not None
+    assert tracking.y.all.rms_share == pytest.approx(1e-9 / SPEC.range_y)
+    assert tracking.y.planned_range == SPEC.range_y
+    assert tracking.y.peak_to_peak == pytest.approx(3 / 5 * SPEC.range_y)
 
 
 def test_a_scan_cut_before_its_lines_has_no_figures_of_them() -> None:
@@ -154,6 +159,7 @@ def test_a_scan_cut_before_its_lines_has_no_figures_of_them() -> None:
     assert tracking.mismatch is None
     assert tracking.x.repeatability is None
     assert tracking.x.preparation is not None
+    assert tracking.x.peak_to_peak == 0.0
 
 
 @pytest.mark.parametrize("pattern", ["spiral", "lissajous"])

@@ -18,7 +18,7 @@ from afm_scan_ros.report.analysis import analyse
 from afm_scan_ros.report.paper import paper_figure, save
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_pictures import comparison_picture, tracking_picture, view_of
-from afm_scan_ros.report.scan_report import error_rows
+from afm_scan_ros.report.scan_report import error_rows, scan_report
 
 OFFSET = 10e-9
 NOISE = 2e-9
@@ -110,6 +110,18 @@ def test_a_scan_that_stops_early_is_reported_and_ends_with_status_3(
     assert "incomplete: it has 5600 of" in captured.err
     assert "x, constant speed" in captured.out
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["shortcomings"]
+
+
+def test_an_incomplete_scan_states_its_error_over_the_planned_range(tmp_path: Path) -> None:
+    """Four of five steps in y are made, and the share is that of the whole scan."""
+    recording = read_scan(record(tmp_path / "bag", stop=5 * BLOCK))
+    analysis = analyse(recording)
+    assert analysis.true is not None
+    assert analysis.true.y.peak_to_peak == pytest.approx(0.8 * analysis.true.y.planned_range)
+    rows = {row[0]: row for row in error_rows(analysis.true)}
+    assert rows["y, on trace"][2] == "0.025"
+    answer, *_ = scan_report(analysis, recording).answer
+    assert "nm rms in y on trace (0.025 % of the planned 40 µm)" in str(answer)
 
 
 def test_a_cut_file_warns_and_ends_with_status_3(
