@@ -12,7 +12,7 @@ from attrs import define, field, frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import ACHIEVED, DESIRED, Aligner, WholeLines, end, part
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED, Aligner, WholeLines, within
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import Array, Trace
 
@@ -38,6 +38,11 @@ class Frame:
         return result
 
 
+def most_pixels(spec: ScanSpec) -> int:
+    """Return the largest number of pixels in a line: a trace has more samples to image."""
+    return int(0.5 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
+
+
 def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
     """Return what a scan images of its lines, all but the overscan at each end.
 
@@ -48,11 +53,10 @@ def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
         raise InputError(
             f"pattern '{spec.pattern}' has no lines to image: use {' or '.join(TO_AND_FRO)}"
         )
-    imaged = 1.0 - 2.0 * spec.overscan
-    samples = int(0.5 * spec.samples_per_line * imaged)
-    if pixels >= samples:
+    most = most_pixels(spec)
+    if pixels > most:
         raise InputError(
-            f"pixels = {pixels}: a trace has {samples} samples to image, give fewer pixels"
+            f"pixels = {pixels}: a trace has {most + 1} samples to image, give fewer pixels"
         )
     lowest = -0.5 * spec.range_x if left is None else left
     margin = spec.overscan * spec.range_x
@@ -141,9 +145,7 @@ class ImageLines:
         """Take a block of one of the two topics; yield the lines that it makes whole."""
         self._aligner.add(name, block)
         for run in self._aligner.ready():
-            start = max(self._where.start, run[0].first_sample)
-            stop = min(self._where.stop, end(run[0]))
-            if start < stop:
-                desired, achieved = (part(trace, start, stop) for trace in run)
+            if on_lines := within(self._where, run):
+                desired, achieved = on_lines
                 heights = self._sample.height(achieved.x, achieved.y)
                 yield from self._imager.add(desired.x, heights)

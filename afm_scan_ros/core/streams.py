@@ -23,6 +23,12 @@ def end(trace: Trace) -> int:
     return trace.first_sample + trace.x.size
 
 
+def within(where: range, run: Sequence[Trace]) -> tuple[Trace, ...]:
+    """Return the samples of a run of several signals that lie in a range; nothing if none does."""
+    start, stop = max(where.start, run[0].first_sample), min(where.stop, end(run[0]))
+    return tuple(part(trace, start, stop) for trace in run) if start < stop else ()
+
+
 MAX_BLOCK = 10_000
 """Most samples that one message may carry."""
 

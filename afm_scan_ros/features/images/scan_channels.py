@@ -7,12 +7,13 @@ import numpy as np
 
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import runs
+from afm_scan_ros.bag.monitored import IMAGE, heights, way_of
 from afm_scan_ros.bag.reader import ScanRecording
-from afm_scan_ros.bag.typestore import Message, decode
+from afm_scan_ros.bag.typestore import decode
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.image_lines import Frame, ImageLine, LineImager, frame_of
+from afm_scan_ros.core.image_lines import Frame, ImageLine, LineImager, frame_of, most_pixels
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import within
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.features.images.files.channels import ImageChannel
@@ -21,11 +22,6 @@ PIXELS = 256
 STREAMS = ("desired_displacement", "achieved_displacement")
 """What images of errors and positions need."""
 TOPOGRAPHY = "Topography"
-IMAGE = "sensor_msgs/msg/Image"
-TOPICS = {"scan_image/trace": "trace", "scan_image/retrace": "retrace"}
-"""Ends of topics, in any namespace, and the directions that they show."""
-KINDS = {("32FC1", False): np.dtype("<f4"), ("32FC1", True): np.dtype(">f4")}
-"""Numbers of heights, by the encoding and whether the first byte is the highest."""
 
 
 def scan_channels(
@@ -40,17 +36,16 @@ def scan_channels(
     Raises InputError where the pattern has no lines, where no line is whole, and for ``pixels``
     beside a recorded image of other width.
     """
-    heights = _recorded_images(recording.path)
-    widths = {values.shape[1] for values in heights.values()}
+    recorded = _recorded_images(recording.path)
+    widths = {values.shape[1] for values in recorded.values()}
     if len(widths | ({pixels} if pixels else set())) > 1:
         raise InputError(
             f"{recording.path}: its image has {' or '.join(map(str, sorted(widths)))} pixels in a"
             f" line, not {pixels}: leave the number of pixels out"
         )
-    room = int(0.5 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
-    frame = frame_of(spec, pixels or next(iter(widths), min(PIXELS, room)))
+    frame = frame_of(spec, pixels or next(iter(widths), min(PIXELS, most_pixels(spec))))
     found = [
-        _channel(spec, frame, TOPOGRAPHY, values, way) for way, values in sorted(heights.items())
+        _channel(spec, frame, TOPOGRAPHY, values, way) for way, values in sorted(recorded.items())
     ][::-1]
     known = set(STREAMS) <= recording.topics.keys()
     for name, lines in (_of_positions(recording, spec, frame) if known else {}).items():
@@ -69,7 +64,7 @@ def _recorded_images(path: Path) -> dict[str, Array]:
     """
     last: dict[str, tuple[str, bytes]] = {}
     for run in (run for file in bag_files(path).files for run in runs(file)):
-        way = next((w for end, w in TOPICS.items() if run.topic.endswith(f"/{end}")), None)
+        way = way_of(run.topic)
         if run.type_name != IMAGE or way is None:
             continue
         if way in last and last[way][0] != run.topic:
@@ -80,11 +75,8 @@ def _recorded_images(path: Path) -> dict[str, Array]:
 
 def _heights(path: Path, topic: str, cdr: bytes) -> Array:
     try:
-        image: Message = decode(IMAGE, cdr)
-        kind = KINDS[image.encoding, bool(image.is_bigendian)]
-        values = np.frombuffer(np.asarray(image.data).tobytes(), kind)
-        return values.reshape(image.height, image.width).astype(np.float64)
-    except (ValueError, KeyError) as error:
+        return heights(decode(IMAGE, cdr))
+    except ValueError as error:
         raise InputError(
             f"{path}: {topic}: no image of heights: {error}: record it again"
         ) from error
@@ -120,10 +112,5 @@ def _of_positions(
 
 
 def _lines(recording: ScanRecording, spec: ScanSpec) -> Iterator[tuple[Trace, ...]]:
-    """Yield runs of desired and achieved displacement, those of the lines alone."""
-    where = phases(spec).lines
-    for run in recording.blocks(*STREAMS):
-        start = max(where.start, run[0].first_sample)
-        stop = min(where.stop, end(run[0]))
-        if start < stop:
-            yield tuple(part(trace, start, stop) for trace in run)
+    """Return runs of desired and achieved displacement, those of the lines alone."""
+    return filter(None, (within(phases(spec).lines, run) for run in recording.blocks(*STREAMS)))

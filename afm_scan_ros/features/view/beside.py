@@ -123,16 +123,13 @@ def _left(process: "subprocess.Popen[bytes]", output: IO[str], settings: ViewSet
         now, sign = time.monotonic(), _sign(output)
         if sign != last:
             changed, last = now, sign
-        begun = sign or _is_stopped(process.pid)
+        stopped = os.WSTOPPED | os.WNOHANG | os.WNOWAIT
+        begun = sign or os.waitid(os.P_PID, process.pid, stopped) is not None
         patience = settings.closing if begun else settings.opening
         if now > min(changed + patience, began + settings.finishing):
             return "the viewer is behind, and the scan did not wait for it: 'afm-scan view' the bag"
         time.sleep(settings.refresh)
     return ""
-
-
-def _is_stopped(child: int) -> bool:
-    return os.waitid(os.P_PID, child, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 def _sign(output: IO[str]) -> int:

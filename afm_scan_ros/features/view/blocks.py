@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from afm_scan_ros.core.image_lines import Frame, frame_of, pixel_means
+from afm_scan_ros.core.image_lines import frame_of, most_pixels, pixel_means
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import (
@@ -16,7 +16,7 @@ from afm_scan_ros.core.streams import (
     part,
 )
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Trace
 from afm_scan_ros.features.view.screen import ERROR, Screen
 
 COMPARED = (DESIRED, ACHIEVED)
@@ -76,8 +76,9 @@ class ShownLines:
         self._spec, self._screen = spec, screen
         self._where = phases(spec).lines
         self._whole = WholeLines(self._where, spec.samples_per_line, 3)
-        self._frame = _frame(spec, pixels)
-        if self._frame is not None:
+        self._frame = None
+        if spec.pattern in TO_AND_FRO:
+            self._frame = frame_of(spec, min(pixels, most_pixels(spec)))
             self._image = np.full((spec.lines, self._frame.pixels), np.nan)
 
     def begins(self, sample: int) -> int:
@@ -93,16 +94,6 @@ class ShownLines:
             first = self._where.start + number * self._spec.samples_per_line
             self._screen.line("tracking_error", line_error(number, first, line[1:]))
             if self._frame is not None:
-                self._image[number] = _trace(line[0], line[1], self._frame)
+                trace = slice(None, line[0].size // 2 + 1)
+                self._image[number] = pixel_means(line[0][trace], line[1][trace], self._frame)
                 self._screen.image("error_x", self._image)
-
-
-def _frame(spec: ScanSpec, pixels: int) -> Frame | None:
-    """Return the pixels of a line, as many as a trace has samples for; none without lines."""
-    room = int(0.5 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
-    return frame_of(spec, min(pixels, room)) if spec.pattern in TO_AND_FRO else None
-
-
-def _trace(position: Array, values: Array, frame: Frame) -> Array:
-    to = slice(None, position.size // 2 + 1)
-    return pixel_means(position[to], values[to], frame)

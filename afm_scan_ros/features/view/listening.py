@@ -12,19 +12,18 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from afm_scan_ros.bag.monitored import WAYS, heights, line_of
 from afm_scan_ros.bag.scan_info import info_from_message
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, monitor_step
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.features.view.kinds import MISSING
-from afm_scan_ros.features.view.messages import IMAGE_TOPICS, heights, line_of
 from afm_scan_ros.features.view.screen import ERROR, Screen, open_screen
 from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import WINDOW
 from afm_scan_ros.nodes import topics
 from afm_scan_ros.nodes.peers import DONE, FAILED, RUNNING
 from afm_scan_ros.nodes.run import join
-from afm_scan_ros.nodes.topics import NodeTopic
 
 OVER = {DONE, FAILED}
 CURVES = {DESIRED: "desired", ACHIEVED: "achieved", ERROR: "error", DRIVE: "drive"}
@@ -66,23 +65,20 @@ def _hear_the_rest(
 
 def _subscribe(node: Node, shown: "ShownNodes") -> None:
     """Read the announcement reliably, of which there is one, and all else best effort."""
-    hearing: dict[NodeTopic, Callable[[Message], None]] = {
+    hearing = {
         topics.MONITOR: shown.sample,
         topics.NODE_STATE: shown.state,
         topics.TRACKING_ERROR: partial(shown.line, topics.TRACKING_ERROR.name),
         topics.MODEL_RESIDUAL: partial(shown.line, topics.MODEL_RESIDUAL.name),
-        topics.TRACE_IMAGE: partial(shown.image, IMAGE_TOPICS[topics.TRACE_IMAGE.name]),
-        topics.RETRACE_IMAGE: partial(shown.image, IMAGE_TOPICS[topics.RETRACE_IMAGE.name]),
+        topics.TRACE_IMAGE: partial(shown.image, WAYS[topics.TRACE_IMAGE.name]),
+        topics.RETRACE_IMAGE: partial(shown.image, WAYS[topics.RETRACE_IMAGE.name]),
     }
     announced = topics.SCAN_INFO
     node.create_subscription(announced.kind, announced.name, shown.meet, announced.reader)
     for topic, hear in hearing.items():
-        node.create_subscription(topic.kind, topic.name, hear, _best_effort(topic))
-
-
-def _best_effort(topic: NodeTopic) -> QoSProfile:
-    depth = max(topic.writer.depth, topic.reader.depth)
-    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+        depth = max(topic.writer.depth, topic.reader.depth)
+        quality = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+        node.create_subscription(topic.kind, topic.name, hear, quality)
 
 
 @define(eq=False)

@@ -6,17 +6,17 @@ from pathlib import Path
 
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import messages
+from afm_scan_ros.bag.monitored import IMAGE, heights, line_of, way_of
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.scan_info import LINE
 from afm_scan_ros.bag.typestore import decode
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, end
 from afm_scan_ros.features.view.blocks import ShownBlocks
-from afm_scan_ros.features.view.messages import IMAGE_TOPICS, heights, line_of
 from afm_scan_ros.features.view.screen import Screen, open_screen
 from afm_scan_ros.features.view.settings import ViewSettings
 
-RESIDUAL, IMAGE = "model_residual", "sensor_msgs/msg/Image"
+RESIDUAL = "model_residual"
 
 
 def show_bag(
@@ -53,8 +53,7 @@ def show_bag(
 def _show_findings(recording: ScanRecording, screen: Screen) -> None:
     """Show the residual of each line, and images, where they were recorded."""
     for message in (m for file in bag_files(recording.path).files for m in messages(file)):
-        name = next((n for n in IMAGE_TOPICS if message.topic.endswith(f"/{n}")), "")
         if message.type_name == LINE and message.topic.endswith(f"/{RESIDUAL}"):
             screen.line(RESIDUAL, line_of(recording.info, decode(LINE, message.cdr)))
-        elif message.type_name == IMAGE and name:
-            screen.image(IMAGE_TOPICS[name], heights(decode(IMAGE, message.cdr)))
+        elif message.type_name == IMAGE and (way := way_of(message.topic)):
+            screen.image(way, heights(decode(IMAGE, message.cdr)))

@@ -1,9 +1,9 @@
 """What a viewer shows of one scan: curves, errors by line, images, states and news."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import inf
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -135,7 +135,9 @@ class Screen:
     def _show_stills(self) -> None:
         """Show images and states, of which the viewer keeps the last ones alone."""
         for name, values in self._images.items():
-            shown = rr.DepthImage(_from_zero(values), colormap=rr.components.Colormap.Viridis)
+            above = values - np.nanmin(values, initial=np.inf)  # colours begin at 0
+            heights = np.nan_to_num(above, nan=0.0).astype(np.float32)
+            shown = rr.DepthImage(heights, colormap=rr.components.Colormap.Viridis)
             rr.log(f"image/{name}", shown, static=True, recording=self.stream)
         self._images.clear()
         if self._states:
@@ -145,24 +147,14 @@ class Screen:
             rr.log("states", shown_table, static=True, recording=self.stream)
 
 
-def _from_zero(values: Array) -> Any:  # noqa: ANN401 - float32, which Array is not
-    """Return an image from its lowest value on, as the viewer's range of colours begins at 0."""
-    lowest = np.nanmin(values, initial=np.inf)
-    return np.nan_to_num(values - lowest, nan=0.0).astype(np.float32)
-
-
 def layout(info: ScanInfo) -> rrb.Blueprint:
     """Return where the viewer shows what: curves on the left, all else on the right."""
-    left = [
-        rrb.TimeSeriesView(origin="/", contents=[f"/{folder}/**"], name=title)
-        for folder, title in _folders()
-        if not folder.startswith("lines")
-    ]
-    lines = [
-        rrb.TimeSeriesView(origin="/", contents=[f"/{folder}/**"], name=title)
-        for folder, title in _folders()
-        if folder.startswith("lines")
-    ]
+    views = {}
+    for panel in PANELS.values():
+        top = panel.folder.partition("/")[0]
+        folder = panel.folder if top == "lines" else top
+        views[folder] = rrb.TimeSeriesView(origin="/", contents=[f"/{folder}/**"], name=panel.title)
+    lines = [views.pop(folder) for folder in list(views) if folder.startswith("lines")]
     image = [rrb.Spatial2DView(origin="/image", name="Image")] if info.spec is not None else []
     said = rrb.Horizontal(
         rrb.TextDocumentView(origin="/states", name="States"),
@@ -170,15 +162,9 @@ def layout(info: ScanInfo) -> rrb.Blueprint:
     )
     right = rrb.Vertical(*image, rrb.Tabs(*lines), said)
     return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(*left), right, column_shares=[3, 2]), collapse_panels=True
+        rrb.Horizontal(rrb.Vertical(*views.values()), right, column_shares=[3, 2]),
+        collapse_panels=True,
     )
-
-
-def _folders() -> Iterator[tuple[str, str]]:
-    """Yield each panel's folder, that of several curves once, and its title."""
-    titles = {panel.title: panel.folder for panel in PANELS.values()}
-    for title, folder in titles.items():
-        yield "displacement" if folder.startswith("displacement") else folder, title
 
 
 def open_screen(info: ScanInfo, where: str, settings: ViewSettings) -> Screen:
