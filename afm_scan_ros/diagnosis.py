@@ -143,12 +143,12 @@ class Diagnosis:
         """Sentences and tables that say what was found, as on the terminal and in the report."""
         found = self._found
         if isinstance(found, CoupledDiagnosis):
-            return (
-                *diagnosis_page.coupled_result(found),
-                *diagnosis_page.coupled_next_steps(found),
-            )
-        steps = (f"next: {step}" for step in next_steps(found))
-        return (*result(found), *unexplained_text(self.residual_report), *steps)
+            said = list(diagnosis_page.coupled_result(found))
+            steps = diagnosis_page.coupled_next_steps(found)
+        else:
+            said = [*result(found), *unexplained_text(self.residual_report)]
+            steps = next_steps(found)
+        return (*said, *(f"next: {step}" for step in steps))
 
     @property
     def cautions(self) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from afm_scan_ros.report.diagnosis_text import (
     VERDICTS,
     alternative_rows,
     brief,
+    described,
     evidence_text,
     form_text,
     next_steps,
@@ -41,12 +42,7 @@ from afm_scan_ros.report.page import ReportPage, Section
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
-from afm_scan_ros.report.residual import (
-    chosen_text,
-    initial_state_text,
-    residual_pictures,
-    residual_text,
-)
+from afm_scan_ros.report.residual import initial_state_text, residual_pictures, residual_text
 from afm_scan_ros.report.table import Part, Rows
 
 SHARES = (
@@ -142,15 +138,12 @@ def _effects(found: ScannerDiagnosis) -> Iterator[str]:
 
 
 def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
-    """Yield what is known of the residual of an axis in the record that shows most of it."""
+    yield described(found, axis)
     diagnosed = found.diagnosis.by_axis[axis]
-    record = most_excited_record(diagnosed)
-    limit = diagnosed.evidence[record].limit
-    before = found.before[axis][record]
-    yield f"{chosen_text(diagnosed)}{before.record}: {' '.join(residual_text(before, limit))}"
     if diagnosed.final is not diagnosed.chain:
-        after = residual_text(found.after[axis][record], limit)
-        yield f"With the extended model: {' '.join(after)}"
+        record = most_excited_record(diagnosed)
+        after, limit = found.after[axis][record], diagnosed.evidence[record].limit
+        yield f"With the extended model: {' '.join(residual_text(after, limit))}"
 
 
 def write_diagnosis(
@@ -175,7 +168,8 @@ def coupled_result(found: CoupledDiagnosis) -> Iterator[Part]:
     """Yield verdict, effects, probabilities and residuals."""
     yield VERDICTS[found.verdict]
     if found.effects:
-        named = [(e.name, probability_text(e.probability), _share(e)) for e in found.effects]
+        shares = [(e, significant(100.0 * e.explained_fraction)) for e in found.effects]
+        named = [(e.name, probability_text(e.probability), share) for e, share in shares]
         yield Rows(COUPLED_ROWS, named)
     yield from probabilities(found)
     figures = found.rms_before, found.rms_after, found.noise_floor
@@ -198,11 +192,11 @@ def next_coupled_record(found: CoupledDiagnosis) -> str | None:
 def coupled_next_steps(found: CoupledDiagnosis) -> Iterator[str]:
     """Yield what to do next."""
     if said := next_coupled_record(found):
-        yield f"next: {said}"
+        yield said
     elif found.verdict == SUFFICIENT:
-        yield "next: Nothing above the detection limit: use this model."
+        yield "Nothing above the detection limit: use this model."
     else:
-        yield "next: Use model.extended.yaml in place of the model."
+        yield "Use model.extended.yaml in place of the model."
     for effect in (e for e in COUPLED_EFFECTS if e.name in found.selected):
         advice = effect.advice[0].upper() + effect.advice[1:]
         yield f"{effect.name}. {LIMITS[effect.remedy]}. {advice}."
@@ -229,7 +223,7 @@ def coupled_report(found: CoupledDiagnosis, of: Provenance) -> ReportPage:
         title="Diagnosis of coupled axes",
         answer=[str(verdict), *_change(found)],
         picture=None,
-        next_steps=[step.removeprefix("next: ") for step in coupled_next_steps(found)],
+        next_steps=list(coupled_next_steps(found)),
         evidence=[
             Section("Effects, probabilities and residuals", rest),
             Section("Alternatives", [Rows(TRIED, _alternatives(found))]),
@@ -290,10 +284,6 @@ def _effect(effect: IdentifiedEffect) -> dict[str, Any]:
             f"The largest remaining band is {significant(of.largest_ratio, 2)} times its limit.",
         ],
     }
-
-
-def _share(effect: IdentifiedEffect) -> str:
-    return significant(100.0 * effect.explained_fraction)
 
 
 def _alternatives(found: CoupledDiagnosis) -> list[tuple[str, ...]]:

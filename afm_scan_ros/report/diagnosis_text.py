@@ -1,7 +1,7 @@
 """A diagnosis as sentences and table rows, for terminal and report."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from decimal import ROUND_DOWN, Context
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
@@ -24,7 +24,7 @@ from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.discrepancy import MotionByBand
 from afm_scan_ros.core.diagnosis.experiments import Proposal
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
-from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, Value, WhyNot
+from afm_scan_ros.core.diagnosis.result import Alternative, IdentifiedEffect, WhyNot
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.report.quantity import harmonic_rows, nanometres, significant, value_text
@@ -156,7 +156,7 @@ def next_steps(found: ScannerDiagnosis) -> Iterator[str]:
 
 HEALTHY = (
     "Record such motion on the scanner while it is healthy, and diagnose again with that record as"
-    " --healthy RECORD, in Python healthy=[record]."
+    " --healthy, in Python as healthy."
 )
 
 
@@ -177,10 +177,10 @@ def proposal(of: Proposal) -> str:
     return (
         f"Record the experiment {sized.name} ({EXPERIMENTS[sized.name].purpose}),"
         f" {_size_text(of)}.{_expected_text(of)}"
-        f" '{command} --export {EXPERIMENTED} --model MODEL' writes its drive as CSV for your"
-        f" converter, of the size of your scanner. '{command} --out {EXPERIMENTED}' records it of a"
-        " simulated scanner, with the --plant of these records. Then diagnose its record together"
-        " with these."
+        f" '{command} --export {EXPERIMENTED}' writes its drive as CSV for your converter, of the"
+        " size of your scanner with this model's file as --model."
+        f" '{command} --out {EXPERIMENTED}' records it of a simulated scanner, with the --plant of"
+        " these records. Then diagnose its record together with these."
     )
 
 
@@ -315,28 +315,18 @@ def caution_text(of: Caution) -> str:
             " effect that is named. Identify the model with loops at several rates."
         )
     if isinstance(of, UntestedMotion):
-        return _untested(of)
+        tested = f" The model was tested with at least {_motion(of.tested)}." if of.tested else ""
+        return (
+            f"{of.axis}: the model's error is not known for the motion of {of.record},"
+            f" {_motion(of.motion)}.{tested} What the record shows may be this error."
+        )
     if isinstance(of, UnlikeHealthy):
-        return _unlike(of)
+        return (
+            f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the model's detection limit from"
+            f" {of.low:g} to {of.high:g} Hz, and raises it. The other healthy records do not show"
+            " such an error. If the scanner was not healthy then, leave this record out."
+        )
     return _above_limit(of)
-
-
-def _untested(of: UntestedMotion) -> str:
-    text = (
-        f"{of.axis}: the model's error is not known for the motion of {of.record},"
-        f" {_motion(of.motion)}."
-    )
-    if of.tested:
-        text += f" The model was tested with at least {_motion(of.tested)}."
-    return f"{text} What the record shows may be this error."
-
-
-def _unlike(of: UnlikeHealthy) -> str:
-    return (
-        f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the model's detection limit from"
-        f" {of.low:g} to {of.high:g} Hz, and raises it. The other healthy records do not show such"
-        " an error. If the scanner was not healthy then, leave this record out."
-    )
 
 
 def _motion(of: MotionByBand) -> str:
@@ -344,25 +334,31 @@ def _motion(of: MotionByBand) -> str:
 
 
 def _above_limit(of: AboveDetectionLimit) -> str:
-    text = (
-        f"{of.axis}: the residual of {of.record} is {of.ratio:.2g} times its detection limit from"
-        f" {of.low:g} to {of.high:g} Hz."
-    )
+    why = "No effect is significant. It may be chance, or an effect too small to identify."
     if of.others:
-        return (
-            f"{text} The other records do not share it. The scanner may have changed between them."
-            " Diagnose each record by itself."
+        why = (
+            "The other records do not share it. The scanner may have changed between them. Diagnose"
+            " each record by itself."
         )
-    return f"{text} No effect is significant. It may be chance, or an effect too small to identify."
+    return (
+        f"{of.axis}: the residual of {of.record} is {of.ratio:.2g} times its detection limit from"
+        f" {of.low:g} to {of.high:g} Hz. {why}"
+    )
 
 
 def unexplained_text(found: ResidualReport) -> Iterator[str]:
     """Yield what is known of each residual that stays unexplained."""
     for axis, diagnosed in found.diagnosis.by_axis.items():
         if diagnosed.verdict == UNEXPLAINED:
-            record = most_excited_record(diagnosed)
-            known = residual_text(found.before[axis][record], diagnosed.evidence[record].limit)
-            yield f"The residual in {axis}: {chosen_text(diagnosed)}{' '.join(known)}"
+            yield f"The residual in {axis}: {described(found, axis)}"
+
+
+def described(found: ResidualReport, axis: str) -> str:
+    """Say what is known of the residual of an axis in the record that shows most of it."""
+    diagnosed = found.diagnosis.by_axis[axis]
+    record = most_excited_record(diagnosed)
+    before, limit = found.before[axis][record], diagnosed.evidence[record].limit
+    return f"{chosen_text(diagnosed)}{before.record}: {' '.join(residual_text(before, limit))}"
 
 
 def _credible(found: ScannerDiagnosis, axis: str) -> Iterator[str]:
@@ -387,15 +383,9 @@ def _with_kind(name: str, kind: str) -> str:
 
 
 def _parameters(effect: IdentifiedEffect) -> Iterator[Row]:
-    name, mark = (
-        _with_kind(effect.name, effect_type(effect.name).kind_label(effect.kind)),
-        " *" if effect.equivalent else "",
-    )
-    for what, value in (harmonic_rows if effect.periodic else _each)(effect.values):
+    name = _with_kind(effect.name, effect_type(effect.name).kind_label(effect.kind))
+    mark = " *" if effect.equivalent else ""
+    values = ((value.parameter.name, value_text(value)) for value in effect.values)
+    for what, value in harmonic_rows(effect.values) if effect.periodic else values:
         yield name, effect.axis, what, f"{value}{mark}"
         name = ""
-
-
-def _each(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
-    for value in values:
-        yield value.parameter.name, value_text(value)

@@ -42,11 +42,8 @@ def _interval(one: ParameterInterval) -> str:
     if one.lower is None and one.upper is None:
         return f"{one.name} not determined"
     unit = "" if one.unit == "1" else f" {one.unit}"
-    return f"{one.name} {_end(one.lower)} to {_end(one.upper)}{unit}"
-
-
-def _end(value: float | None) -> str:
-    return "?" if value is None else f"{value:.4g}"
+    low, high = ("?" if end is None else f"{end:.4g}" for end in (one.lower, one.upper))
+    return f"{one.name} {low} to {high}{unit}"
 
 
 def _between(given: Range | None, unit: str) -> str:

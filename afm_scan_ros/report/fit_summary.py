@@ -1,6 +1,5 @@
 """An identification as JSON, ``MODEL.fit.json``, and what it found wrong in sentences."""
 
-from functools import singledispatch
 from typing import Any
 
 from attrs import asdict
@@ -24,61 +23,38 @@ SENTENCES: dict[type[found.Finding], str] = {
     found.UncertainScan: "The records tell a scan over the whole drive to {share:.1%} of its range"
     " only (one standard deviation). Add triangles or loops over the whole drive, of several"
     " amplitudes.",
+    found.UnknownStart: "The hysteresis' state at the start of {record} is unknown, so its first"
+    " {seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state that.",
+    found.SensorLowPass: "The displacement is read through a low-pass of order {order} at"
+    " {corner:.4g} Hz, as of a sensor's electronics. The model predicts what is read, and its"
+    " inverse leaves the low-pass alone: in motion the scanner is ahead of what the sensor shows.",
+    found.LateReading: "The displacement is {delay} late, as of a converter's or a control box's"
+    " buffer. The model predicts what is read, and its inverse leaves the delay alone, as if it"
+    " were the sensor's: where the drive is late, so is the motion, by as much.",
+    found.Hum: "{record} holds a periodic disturbance: {lines}. It is no part of the model. Find"
+    " its source, or keep it off the sensor and the amplifier.",
+    found.ReadAfterUpdate: "The displacement in {record} was read after each update of the drive,"
+    " {predicted}",
 }
-"""Findings that are worded with their figures as they are."""
+READ_SO = "and the model predicts what is read so."
+READ_BEFORE = (
+    "which its steps show. The model predicts what is read just before, as in other records:"
+    " compare its predictions with the next sample."
+)
 
 
-@singledispatch
 def finding_text(finding: found.Finding) -> str:
     """Say what was found and what to do about it."""
-    return SENTENCES[type(finding)].format(**asdict(finding))  # type: ignore[arg-type] # all are attrs
-
-
-@finding_text.register
-def _(finding: found.ReadAfterUpdate) -> str:
-    read = f"The displacement in {finding.record} was read after each update of the drive,"
-    if finding.predicted:
-        return f"{read} and the model predicts what is read so."
-    return (
-        f"{read} which its steps show. The model predicts what is read just before, as in other"
-        " records: compare its predictions with the next sample."
-    )
-
-
-@finding_text.register
-def _(one: found.UnknownStart) -> str:
-    return (
-        f"The hysteresis' state at the start of {one.record} is unknown, so its first"
-        f" {one.seconds:.3g} s were not fitted. Depolarise the scanner before a record, and state"
-        " that."
-    )
-
-
-@finding_text.register
-def _(one: found.SensorLowPass) -> str:
-    return (
-        f"The displacement is read through a low-pass of order {one.order} at {one.corner:.4g} Hz,"
-        " as of a sensor's electronics. The model predicts what is read, and its inverse leaves the"
-        " low-pass alone: in motion the scanner is ahead of what the sensor shows."
-    )
-
-
-@finding_text.register
-def _(one: found.LateReading) -> str:
-    return (
-        f"The displacement is {1e3 * one.delay:.4g} ms late, as of a converter's or a control box's"
-        " buffer. The model predicts what is read, and its inverse leaves the delay alone, as if it"
-        " were the sensor's: where the drive is late, so is the motion, by as much."
-    )
-
-
-@finding_text.register
-def _(one: found.Hum) -> str:
-    lines = ", ".join(f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in one.lines)
-    return (
-        f"{one.record} holds a periodic disturbance: {lines}. It is no part of the"
-        " model. Find its source, or keep it off the sensor and the amplifier."
-    )
+    values = asdict(finding)  # type: ignore[arg-type] # all are attrs
+    match finding:
+        case found.LateReading():
+            values["delay"] = f"{1e3 * finding.delay:.4g} ms"
+        case found.Hum():
+            lines = (f"{1e9 * size:.2g} nm at {hertz:.6g} Hz" for hertz, size in finding.lines)
+            values["lines"] = ", ".join(lines)
+        case found.ReadAfterUpdate():
+            values["predicted"] = READ_SO if finding.predicted else READ_BEFORE
+    return SENTENCES[type(finding)].format(**values)
 
 
 def fit_summary(identification: Identification) -> dict[str, Any]:
