@@ -100,24 +100,22 @@ def demo(out: Path, figures: str) -> None:
 
 def next_commands(out: Path) -> Iterator[CommandLine]:
     """Yield what to do after the demonstration."""
-    calibration = out / "calibration"
+    calibration, plant = out / "calibration", CONFIG / "plants/delay_medium.yaml"
     records = ("creep", "frequency", "hysteresis", "validation")
-    bags = " ".join(f"--{kind} {calibration / kind}" for kind in records)
+    bags = [word for kind in records for word in (f"--{kind}", calibration / kind)]
     yield CommandLine(
         "See all errors of one scan.",
-        f"afm-scan analyze {out / 'bags' / '30hz_all'} --report {out / 'scan.html'}",
+        ["analyze", out / "bags/30hz_all", "--report", out / "scan.html"],
     )
+    yield CommandLine("Record the identification drives.", ["calibrate", "--out", calibration])
     yield CommandLine(
-        "Record the identification drives.", f"afm-scan calibrate --out {calibration}"
-    )
-    yield CommandLine(
-        "Identify a model from them.", f"afm-scan identify {bags} --out {out / 'model.yaml'}"
+        "Identify a model from them.", ["identify", *bags, "--out", out / "model.yaml"]
     )
     yield CommandLine(
         "Find an effect that the model lacks, and compensate it.",
-        f"afm-scan close-loop --plant {CONFIG / 'plants/delay_medium.yaml'} --out {out / 'loop'}",
+        ["close-loop", "--plant", plant, "--out", out / "loop"],
     )
-    yield CommandLine("Import a measured record of your own scanner.", "afm-scan import-csv --help")
+    yield CommandLine("Import a measured record of your own scanner.", ["import-csv", "--help"])
 
 
 def _scan(case: DemoScan, out: Path) -> Path:
@@ -145,4 +143,4 @@ def _images(out: Path) -> Images:
     without, compensated = (read_scan(out / "bags" / scan.stem) for scan in IMAGED)
     desired = without.whole("desired_displacement")
     achieved = without.whole("true_displacement"), compensated.whole("true_displacement")
-    return images_of(TwoScans(scan_spec(without), desired, achieved, (WITHOUT, WITH)))
+    return images_of(TwoScans(scan_spec(without), desired, achieved, "true", (WITHOUT, WITH)))

@@ -74,6 +74,13 @@ class DrivenScanner:
         """Parameters of the simulated scanner; none of another."""
         return {"seed": self.seed, "age_s": self.age} if self.scanner == SIM else {}
 
+    @property
+    def options(self) -> tuple[object, ...]:
+        """Options of a command that drives this scanner; none for the usual simulated one."""
+        if self.scanner != SIM:
+            return "--scanner", self.scanner
+        return ("--plant", self.plant) if self.plant != PLANT else ()
+
     def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
         """Drive the scanner through a plan, and record it in a bag.
 

@@ -98,7 +98,7 @@ def identify(
     model.save(out, HEADING)
     summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
     write_text(out.with_suffix(".fit.json"), summary + "\n")
-    fit_report(found, str(out)).write(out.with_suffix(".fit.html"), figures)
+    fit_report(found, out).write(out.with_suffix(".fit.html"), figures)
     _show(found)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     say(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")

@@ -78,7 +78,7 @@ def analyze(
     if figure is not None:
         from afm_scan_ros.report.paper import paper_figure, save  # noqa: PLC0415 - by matplotlib
 
-        title = f"Scan {analysis.scan.scan_id}"
+        title = f"Scan {analysis.name}"
         save(paper_figure(tracking_picture(view_of(recording), title)), figure)
     if analysis.shortcomings:
         raise ScanError("; ".join(analysis.shortcomings))

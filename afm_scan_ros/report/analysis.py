@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from math import isclose
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -9,10 +10,11 @@ from attrs import field, frozen
 
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import METRES, Tracking, TrackingMeter
+from afm_scan_ros.core.metrics import METRES, AxisError, Tracking, TrackingMeter
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.sensor_check import sensor_doubt
+from afm_scan_ros.core.streams import ACHIEVED, DESIRED
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 OTHER_RANGE = 0.05
@@ -45,6 +47,11 @@ class Analysis:
     warnings: tuple[str, ...]
     shortcomings: tuple[str, ...]
 
+    @property
+    def name(self) -> str:
+        """Name of the bag's folder or file."""
+        return Path(self.bag).absolute().name
+
 
 def scan_spec(recording: ScanRecording) -> ScanSpec:
     """Return what the scan was to be; raises InputError for a record that is not a scan."""
@@ -70,16 +77,16 @@ def analyse(recording: ScanRecording) -> Analysis:
     Raises InputError where the bag holds no scan, or one with a gap, a repeat or a NaN.
     """
     spec = scan_spec(recording)
-    meters = {"achieved_displacement": TrackingMeter(spec, "measured")}
+    meters = {ACHIEVED: TrackingMeter(spec, "measured")}
     if "true_displacement" in recording.topics:
         meters["true_displacement"] = TrackingMeter(spec, "true")
     ends = []
-    for desired, *achieved in recording.blocks("desired_displacement", *meters):
+    for desired, *achieved in recording.blocks(DESIRED, *meters):
         if desired.x.size:
             ends.append(_ends(achieved[0]))
         for meter, trace in zip(meters.values(), achieved, strict=True):
             meter.add(desired, trace)
-    measured = meters["achieved_displacement"].tracking()
+    measured = meters[ACHIEVED].tracking()
     true = meters.get("true_displacement")
     total = recording.info.total_samples
     incomplete = (
@@ -106,18 +113,17 @@ def _ends(trace: Trace) -> Ends:
 
 def _doubts(recording: ScanRecording, measured: Tracking, ends: list[Ends]) -> Iterator[str]:
     """Say what is dubious in the sensors, and where the samples are not those of scan_info."""
-    spec = scan_spec(recording)
-    planned = {"x": spec.range_x, "y": spec.range_y}
+    complete = measured.lines == scan_spec(recording).lines
     for number, axis in enumerate(AXES if ends else ()):
-        moved = getattr(measured, axis).peak_to_peak
+        error: AxisError = getattr(measured, axis)
+        moved, planned = error.peak_to_peak, error.planned_range
         lowest, highest = np.array([each[number] for each in ends]).T
-        doubt = sensor_doubt(axis, moved, lowest.min(), highest.max())
-        if doubt:
+        if doubt := sensor_doubt(axis, moved, lowest.min(), highest.max()):
             yield f"{recording.path}: {doubt}"
-        if measured.lines == spec.lines and not isclose(moved, planned[axis], rel_tol=OTHER_RANGE):
+        if complete and not isclose(moved, planned, rel_tol=OTHER_RANGE):
             yield (
-                f"{recording.path}: scan_info states a range of {planned[axis]:g} m in {axis}, and"
-                f" the desired displacement spans {moved:g} m"
+                f"{recording.path}: scan_info states a range of {planned:g} m in {axis}, and the"
+                f" desired displacement spans {moved:g} m"
             )
 
 
@@ -130,9 +136,6 @@ def _drive_range(recording: ScanRecording) -> DriveRange | None:
         return None
     lowest, highest = np.min(ends, axis=0)[:, 0].tolist(), np.max(ends, axis=0)[:, 1].tolist()
     return DriveRange(lowest[0], highest[0], lowest[1], highest[1])
-
-
-DESIRED, ACHIEVED = "desired_displacement", "achieved_displacement"
 
 
 @frozen

@@ -1,10 +1,10 @@
 """The report on a closed loop: rows, sentences and the page."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from afm_scan_ros.core.closed_loop import FIRST, Round
-from afm_scan_ros.core.metrics import Figure, Tracking
-from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.comparison import ScanComparison
+from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.diagnosis_text import (
@@ -43,41 +43,27 @@ REPLAYED = (
 )
 
 
-def trial_title(name: str, spec: ScanSpec, axis: str) -> str:
-    """Say what a trial is: its name in the row of x, below it as ``raster, 10 Hz, 40 µm``."""
-    if axis == "x":
-        return f"{name}:"
-    return f"{spec.pattern}, {spec.line_rate:.4g} Hz, {1e6 * spec.range_x:.4g} µm"
+def _trial_rows(done: Round, cells: Callable[[ScanComparison, str], Iterable[str]]) -> list[Row]:
+    """Return a row for each trial and axis: its name in x, below it what it is."""
+    rows: list[Row] = []
+    for name, trial in done.comparisons.items():
+        spec = done.before[name].spec
+        said = f"{spec.pattern}, {spec.line_rate:.4g} Hz, {1e6 * spec.range_x:.4g} µm"
+        rows += [(f"{name}:", "x", *cells(trial, "x")), (said, "y", *cells(trial, "y"))]
+    return rows
 
 
-def tracking_rows(done: Round) -> list[Row]:
-    """Return a row for each trial and axis: its errors before and after."""
-    return [
-        (
-            trial_title(name, done.before[name].spec, axis),
-            axis,
-            _change(trial.measured_before, trial.measured_after, axis, "all"),
-            *(
-                _change(trial.true_before, trial.true_after, axis, part)
-                for part in ("all", "constant_speed", "turnarounds")
-            ),
-        )
-        for name, trial in done.comparisons.items()
-        for axis in AXES
-    ]
+def _tracked(trial: ScanComparison, axis: str) -> Iterator[str]:
+    """Yield the errors before and after."""
+    yield _change(trial.measured_before, trial.measured_after, axis, "all")
+    for part in ("all", "constant_speed", "turnarounds"):
+        yield _change(trial.true_before, trial.true_after, axis, part)
 
 
-def trial_residual_rows(done: Round) -> list[Row]:
-    """Return a row for each trial and axis: the residual of the model and of the extended one."""
-    return [
-        (
-            trial_title(name, done.before[name].spec, axis),
-            axis,
-            *(nanometres(v) for v in (rms.floor, rms.before, rms.after)),
-        )
-        for name, trial in done.comparisons.items()
-        for axis, rms in trial.residual.items()
-    ]
+def _left(trial: ScanComparison, axis: str) -> Iterator[str]:
+    """Return the residual of the model and of the extended one, behind its limit."""
+    rms = trial.residual[axis]
+    return map(nanometres, (rms.floor, rms.before, rms.after))
 
 
 def reported(rounds: Sequence[Round]) -> Round:
@@ -92,7 +78,7 @@ def round_result(done: Round) -> Iterator[Part]:
     yield residuals(done.diagnosis)
     yield HELD_OUT
     if done.comparisons:
-        yield Rows(TRACKING, tracking_rows(done))
+        yield Rows(TRACKING, _trial_rows(done, _tracked))
     yield from outcome(done)
 
 
@@ -163,15 +149,15 @@ def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = ""
     """Return the report on the rounds; ``failure`` ended the next one, if any."""
     last = reported(rounds)
     found = last.diagnosis
-    compared = [(number, done) for number, done in enumerate(rounds, 1) if done.comparisons]
-    shown = next((number for number, done in compared if done is last), None)
+    numbered = list(enumerate(rounds, 1))
+    shown = next((n for n, done in numbered if done is last and done.comparisons), None)
     return ReportPage(
         title="Closed loop: scan, diagnose, extend, scan again",
         answer=[*brief(found), " ".join(final_text(rounds, failure))],
         picture=_lines(last, shown) if shown else None,
         next_steps=list(next_steps(found)),
         evidence=[
-            *(_round(number, done, first=number == shown) for number, done in enumerate(rounds, 1)),
+            *(_round(number, done, first=number == shown) for number, done in numbered),
             Section("Method", [METHOD]),
         ],
         warnings=of.shortcomings,
@@ -184,21 +170,21 @@ def _round(number: int, done: Round, *, first: bool) -> Section:
     parts: list[PagePart] = list(round_result(done))
     parts.append(PageLink(f"Diagnosis of round {number}", f"round_{number}/report.html"))
     if done.comparisons:
-        parts += [Rows(RESIDUAL, trial_residual_rows(done)), UNSEEN]
+        parts += [Rows(RESIDUAL, _trial_rows(done, _left)), UNSEEN]
         parts += [] if first else [_lines(done, number)]
         parts.append(_grating(done, number))
     return Section(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}", parts)
 
 
 def _lines(done: Round, number: int) -> Picture:
-    kind = "True" if done.before[FIRST].knows_true else "Measured"
-    return error_picture(f"lines_{number}", _both(done, FIRST), kind)
+    scans = TwoScans.of(done.before[FIRST], done.after[FIRST], *NAMES)
+    return error_picture(f"lines_{number}", scans)
 
 
 def _grating(done: Round, number: int) -> Picture:
     """Show a grating as a scan with either inverse images it."""
     imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
-    images = images_of(_both(done, imaged))
+    images = images_of(TwoScans.of(done.before[imaged], done.after[imaged], *NAMES))
     before, after = (nanometres(error) for error in images.errors)
     caption = (
         f"A simulated grating of 16 µm pitch and 100 nm height, imaged by '{imaged}'. Each height"
@@ -208,16 +194,7 @@ def _grating(done: Round, number: int) -> Picture:
     return image_picture(f"grating_{number}", images, caption)
 
 
-def _both(done: Round, name: str) -> TwoScans:
-    before, after = done.before[name], done.after[name]
-    known = before.knows_true and after.knows_true
-    shown = (before.true, after.true) if known else (before.measured, after.measured)
-    return TwoScans(before.spec, before.desired, shown, NAMES)
-
-
 def _change(before: Tracking | None, after: Tracking | None, axis: str, part: str) -> str:
     """Say how an error changed; an error that is not known is a dash."""
-    figures: list[Figure | None] = [
-        getattr(getattr(t, axis), part) if t else None for t in (before, after)
-    ]
+    figures = (getattr(getattr(t, axis), part) if t else None for t in (before, after))
     return " → ".join("-" if f is None else nanometres(f.rms) for f in figures)

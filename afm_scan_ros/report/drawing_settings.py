@@ -24,11 +24,11 @@ class DrawingSettings:
     side: int = setting(
         256, "pixels", "along a side of an image, at most", "an image is some 400 pixels wide"
     )
-    error_side: int = setting(
+    error_pixels: int = setting(
         128,
         "pixels",
-        "along a side of the image of an error, at most",
-        "the errors of both axes on trace and retrace take 350 kB",
+        "in a line of the image of an error, at most",
+        "the errors of both axes on trace and retrace take 700 kB",
     )
     row: int = setting(
         200, "pixels", "height of a row of panels", "answer and figure fit into 800 pixels"

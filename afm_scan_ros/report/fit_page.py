@@ -1,13 +1,14 @@
 """The fit report as a page: what was fitted on what, and how well."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from afm_scan_ros.core.identification.fitted_axis import FittedAxis
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import ModelDiscrepancy
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
-from afm_scan_ros.report.fit_pictures import fit_picture, response_picture, slow_picture
+from afm_scan_ros.report.fit_pictures import fit_picture
 from afm_scan_ros.report.fit_summary import finding_text
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import MILLI, NANO
@@ -28,8 +29,8 @@ METHOD = (
 )
 
 
-def fit_report(found: Identification, model: str) -> ReportPage:
-    """Return the fit report; ``model`` is the name of the model's file."""
+def fit_report(found: Identification, model: Path) -> ReportPage:
+    """Return the fit report; ``model`` is the file of the model."""
     warned = [(name, one) for name, axis in found.axes.items() for one in axis.warnings]
     known = [
         (f"{axis}, {effect}", status_text(status), intervals_text(status))
@@ -39,14 +40,14 @@ def fit_report(found: Identification, model: str) -> ReportPage:
     return ReportPage(
         title="Identification of a scanner",
         answer=list(_answer(found)),
-        picture=fit_picture(found),
+        picture=fit_picture(found, "fit"),
         next_steps=list(_next(model)),
         warnings=[f"{name}: {finding_text(one)}" for name, one in warned],
         evidence=[
             Section("What is known of each effect", [Rows(KNOWN, known)]),
             Section("Fit and prediction of each record", list(_fits(found))),
-            Section("Response and vibration", [response_picture(found)]),
-            Section("Creep and hysteresis", [slow_picture(found)]),
+            Section("Response and vibration", [fit_picture(found, "response")]),
+            Section("Creep and hysteresis", [fit_picture(found, "slow")]),
             Section("Model discrepancy", [METHOD, *_discrepancies(found)]),
         ],
     )
@@ -69,11 +70,16 @@ def _answer(found: Identification) -> Iterator[str]:
         yield "No record was held out of the fit, so its error in another record is not known."
 
 
-def _next(model: str) -> Iterator[CommandLine]:
-    yield CommandLine("Scan with the model's inverse.", f"afm-scan scan --model {model} --bag BAG")
+def _next(model: Path) -> Iterator[CommandLine]:
+    bag, diagnosis = (model.with_name(f"{model.stem}_{name}") for name in ("scan", "diagnosis"))
     yield CommandLine(
-        "Later, ask whether the scanner still is what the model says.",
-        f"afm-scan diagnose BAG --model {model} --out diagnosis",
+        "Scan with the model's inverse. Name your scanner with --scanner, or else the simulated one"
+        " is scanned.",
+        ["scan", "--model", model, "--bag", bag],
+    )
+    yield CommandLine(
+        "Ask now and then whether the scanner still is what the model says.",
+        ["diagnose", bag, "--model", model, "--out", diagnosis],
     )
 
 

@@ -1,11 +1,12 @@
 """Pictures of an identification: responses, creep, loops, residuals and discrepancy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import cycle
 
 import numpy as np
 
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.local_response import Complex
 from afm_scan_ros.core.model import AxisModel
@@ -35,42 +36,9 @@ HALF_TURN = 180.0
 """Degrees from one point to the next at which a curve of the phase is cut."""
 HERTZ = "frequency in Hz"
 
-Draw = Callable[[str, FittedAxis], Panel]
 
-
-def fit_picture(found: Identification) -> Picture:
-    """Show each record before and after the fit: its motion, and what the model leaves of it."""
-    return _rows(
-        found,
-        "fit",
-        "Left: rms by band of the motion of a record, if there is one that was not fitted, and of"
-        " what the model leaves of it. Right: what the model leaves of each record.",
-        _bands,
-        _left,
-    )
-
-
-def response_picture(found: Identification) -> Picture:
-    """Show magnitude and phase of the response to F, of each record and of the model."""
-    return _rows(
-        found,
-        "response",
-        "Response of the displacement to F = H(u), creep and the converter's hold included: by"
-        " local fits to each record, and of the model.",
-        _magnitude,
-        _phase,
-    )
-
-
-def slow_picture(found: Identification) -> Picture:
-    """Show the creep after a step, and the loops of F = H(u)."""
-    caption = "Creep of the model after a step, and the loops of the records."
-    return _rows(found, "slow", caption, _creep, _loops)
-
-
-def _rows(found: Identification, name: str, caption: str, *panels: Draw) -> Picture:
-    rows = [[draw(axis, of) for draw in panels] for axis, of in found.axes.items()]
-    return Picture(name, caption, rows)
+def _coloured(found: FittedAxis) -> Iterator[tuple[FittedRecord, str]]:
+    return zip(found.records, cycle(COLOURS), strict=False)
 
 
 def _response(model: AxisModel, frequency: Array, sample_period: float) -> Complex:
@@ -94,11 +62,10 @@ def _phase(name: str, found: FittedAxis) -> Panel:
 def _responses(found: FittedAxis, of: Callable[[Complex], Array]) -> list[Mark]:
     """Return a figure ``of`` the responses of all records, and of the model over their band."""
     marks: list[Mark] = []
-    for k, record in enumerate(found.records):
+    for record, colour in _coloured(found):
         measured = record.response
         clear = measured.coherence > COHERENCE
         seen = of(measured.response[clear])
-        colour = COLOURS[k % len(COLOURS)]
         marks.append(Curve(measured.frequency[clear], seen, record.name, colour, dots=True))
     shortest = min(found.records, key=lambda record: record.sample_period)
     highest = 0.5 / shortest.sample_period
@@ -120,16 +87,16 @@ def _creep(name: str, found: FittedAxis) -> Panel:
 
 def _loops(name: str, found: FittedAxis) -> Panel:
     curves = [
-        Curve(r.drive, r.effective, r.name, COLOURS[k % len(COLOURS)], width=0.6)
-        for k, r in enumerate(found.records)
+        Curve(record.drive, record.effective, record.name, colour, width=0.6)
+        for record, colour in _coloured(found)
     ]
     return Panel(curves, "drive u in V", "effective input F in V", f"{name}: loops")
 
 
 def _left(name: str, found: FittedAxis) -> Panel:
     curves = [
-        Curve(r.seconds / r.seconds[-1], NANO * r.left, r.name, COLOURS[k % len(COLOURS)])
-        for k, r in enumerate(found.records)
+        Curve(record.seconds / record.seconds[-1], NANO * record.left, record.name, colour)
+        for record, colour in _coloured(found)
     ]
     for one in found.validations:
         share = np.linspace(0.0, 1.0, len(one.residual))
@@ -151,3 +118,19 @@ def _bands(name: str, found: FittedAxis) -> Panel:
         steps.append(Steps(edges, shown, label, colour))
     which = "fitted" if known.fitted else "held out"
     return Panel(steps, HERTZ, "rms in nm", f"{name}: {which}, rms by band", "xy")
+
+
+CAPTIONS = {
+    "fit": "Left: rms by band of the motion of a record, if there is one that was not fitted, and"
+    " of what the model leaves of it. Right: what the model leaves of each record.",
+    "response": "Response of the displacement to F = H(u), creep and the converter's hold included:"
+    " by local fits to each record, and of the model.",
+    "slow": "Creep of the model after a step, and the loops F = H(u) of the records.",
+}
+PANELS = {"fit": (_bands, _left), "response": (_magnitude, _phase), "slow": (_creep, _loops)}
+
+
+def fit_picture(found: Identification, name: str) -> Picture:
+    """Return the picture of a name among ``PANELS``, with a row for each axis."""
+    rows = [[draw(axis, of) for draw in PANELS[name]] for axis, of in found.axes.items()]
+    return Picture(name, CAPTIONS[name], rows)

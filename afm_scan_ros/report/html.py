@@ -21,11 +21,6 @@ def page(name: str, folder: Path = TEMPLATES, **values: object) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates.tests["kind"] = _is_kind
+    templates.tests["kind"] = lambda part, name: type(part).__name__ == name
     templates.filters["zip"] = zip
     return templates.get_template(name).render(values)
-
-
-def _is_kind(part: object, name: str) -> bool:
-    """Whether a part of a page is of the class of this name."""
-    return type(part).__name__ == name

@@ -1,6 +1,7 @@
 """What a report says, in the order in which it is read: the answer, what to do next, evidence."""
 
-from collections.abc import Iterator, Sequence
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -9,7 +10,7 @@ from attrs import frozen
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.report import html
 from afm_scan_ros.report.picture import Picture
-from afm_scan_ros.report.provenance import Provenance
+from afm_scan_ros.report.provenance import SOURCE, Provenance
 from afm_scan_ros.report.table import Rows
 
 
@@ -23,10 +24,15 @@ class PageLink:
 
 @frozen
 class CommandLine:
-    """A command line, and what it serves."""
+    """A command of ``afm-scan`` by its words, and what it serves."""
 
     purpose: str
-    line: str
+    words: Sequence[object]
+
+    @property
+    def line(self) -> str:
+        """The command as a shell takes it, whatever the names of files."""
+        return shlex.join(["afm-scan", *map(str, self.words)])
 
 
 @frozen
@@ -67,15 +73,24 @@ class ReportPage:
     provenance: Provenance | None = None
 
     @property
+    def sections(self) -> list[Section]:
+        """The evidence, and where it is from."""
+        made = self.provenance
+        if made is None:
+            return list(self.evidence)
+        of = [
+            ("written", f"{made.written} by {made.package}"),
+            ("model", made.model),
+            ("SHA-256 of the model's numbers", made.model_hash),
+        ]
+        tables = [Rows((), of), Rows(SOURCE, [record.cells for record in made.records])]
+        return [*self.evidence, Section("Provenance", tables)]
+
+    @property
     def pictures(self) -> list[Picture]:
         """Every picture, that of the answer first."""
-        return list(self._pictures())
-
-    def _pictures(self) -> Iterator[Picture]:
-        if self.picture is not None:
-            yield self.picture
-        for section in self.evidence:
-            yield from (part for part in section.parts if isinstance(part, Picture))
+        parts = [self.picture, *(part for section in self.evidence for part in section.parts)]
+        return [part for part in parts if isinstance(part, Picture)]
 
     def page(self) -> str:
         """Return the report as one HTML page that needs nothing else."""

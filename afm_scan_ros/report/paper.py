@@ -1,10 +1,8 @@
 """Pictures drawn by matplotlib, as files for papers."""
 
-from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -15,6 +13,7 @@ from afm_scan_ros.report.picture import (
     Bars,
     Curve,
     Map,
+    Mark,
     Panel,
     PickedLine,
     Picture,
@@ -23,7 +22,7 @@ from afm_scan_ros.report.picture import (
     Stretches,
 )
 from afm_scan_ros.report.reduction import thinned
-from afm_scan_ros.report.style import blank, legend_above, styled
+from afm_scan_ros.report.style import blank, styled
 
 FORMATS = ("pdf", "svg", "png")
 WIDTH, ROW = 9.6, 2.4
@@ -73,51 +72,38 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         _draw(mark, axes)
     if panel.dates:
         axes.xaxis_date()
-    legend_above(axes)
+    if axes.get_legend_handles_labels()[0]:
+        place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3}
+        axes.legend(**place, borderaxespad=0.2, columnspacing=1.0, fontsize=8)
 
 
-@singledispatch
-def _draw(mark: object, axes: Axes) -> None:
-    raise TypeError(f"{type(mark).__name__} is no mark, for {axes}")
+def _draw(mark: Mark, axes: Axes) -> None:
+    if isinstance(mark, Map):
+        _draw_map(mark, axes)
+        return
+    style: Any = {"color": mark.colour, "label": mark.name or None}
+    match mark:
+        case Curve(dots=True):
+            shown = thinned(mark)
+            axes.plot(shown.x, shown.y, ls="", marker="o", ms=2.5, **style)
+        case Curve():
+            shown = thinned(mark)
+            axes.plot(shown.x, shown.y, lw=mark.width, ls=mark.dash, **style)
+        case PickedLine():
+            axes.plot(mark.of.across, mark.middle, lw=1.1, **style)
+        case Steps():
+            axes.stairs(mark.values, mark.edges, ls=mark.dash, lw=1.4, **style)
+        case Shade():
+            axes.fill_between(mark.x, mark.low, mark.high, alpha=0.3, lw=0, **style)
+        case Bars():
+            axes.vlines(mark.x, mark.low, mark.high, lw=mark.width, **style)
+        case Stretches():
+            for start, end in mark.ends:
+                axes.axvspan(start, end, alpha=0.35, lw=0, **style)
+                style = {"color": mark.colour}
 
 
-@_draw.register
-def _(mark: Curve, axes: Axes) -> None:
-    shown = thinned(mark)
-    style: Any = {"lw": mark.width, "ls": "--" if mark.dashed else "-"}
-    if mark.dots:
-        style = {"ls": "", "marker": "o", "ms": 2.5}
-    axes.plot(shown.x, shown.y, color=mark.colour, label=mark.name or None, **style)
-
-
-@_draw.register
-def _(mark: Shade, axes: Axes) -> None:
-    label = mark.name or None
-    axes.fill_between(mark.x, mark.low, mark.high, color=mark.colour, alpha=0.3, lw=0, label=label)
-
-
-@_draw.register
-def _(mark: Steps, axes: Axes) -> None:
-    style = "--" if mark.dashed else "-"
-    axes.stairs(mark.values, mark.edges, color=mark.colour, ls=style, lw=1.4, label=mark.name)
-
-
-@_draw.register
-def _(mark: Bars, axes: Axes) -> None:
-    style: Any = {"lw": mark.width, "label": mark.name or None}
-    axes.vlines(mark.x, mark.low, mark.high, color=mark.colour, **style)
-
-
-@_draw.register
-def _(mark: Stretches, axes: Axes) -> None:
-    label: str | None = mark.name
-    for start, end in mark.ends:
-        axes.axvspan(start, end, color=mark.colour, alpha=0.35, lw=0, label=label)
-        label = None
-
-
-@_draw.register
-def _(mark: Map, axes: Axes) -> None:
+def _draw_map(mark: Map, axes: Axes) -> None:
     drawn = axes.imshow(
         mark.values,
         cmap="RdBu_r" if mark.signed else "gray",
@@ -128,10 +114,3 @@ def _(mark: Map, axes: Axes) -> None:
         aspect="auto",
     )
     axes.figure.colorbar(drawn, ax=axes, label=mark.label)
-
-
-@_draw.register
-def _(mark: PickedLine, axes: Axes) -> None:
-    middle = len(mark.of.values) // 2
-    values = np.asarray(mark.of.values)[middle]
-    axes.plot(mark.of.across, values, color=mark.colour, lw=1.1, label=mark.name)

@@ -14,6 +14,7 @@ from afm_scan_ros.core.types import Array
 
 Places: TypeAlias = Array | NDArray[np.datetime64]
 """Where marks lie on the axis of x; times are dates."""
+Dash: TypeAlias = Literal["solid", "dashed"]
 NANO, MICRO, MILLI = 1e9, 1e6, 1e3
 """What a picture multiplies by for nm, µm and ms."""
 
@@ -33,7 +34,7 @@ class Curve:
     colour: str = BLUE
     width: float = 1.1
     dots: bool = False
-    dashed: bool = False
+    dash: Dash = "solid"
 
 
 @frozen(eq=False)
@@ -55,7 +56,7 @@ class Steps:
     values: Array
     name: str = ""
     colour: str = BLUE
-    dashed: bool = False
+    dash: Dash = "solid"
 
 
 @frozen(eq=False)
@@ -81,29 +82,28 @@ class Stretches:
 
 @frozen(eq=False)
 class Map:
-    """An image: values (lines, pixels), the lowest line first, and where it lies."""
+    """An image: values (lines, pixels), the lowest line first.
+
+    ``span`` is its left, right, bottom and top. Its colours go from ``low`` to ``high``; values
+    that are ``signed``, as errors, have zero in the middle of them. On a page that has fewer pixels
+    each shows the mean of some, or the largest of them where the image is of ``peaks``.
+    """
 
     values: Array
-    left: float
-    right: float
-    bottom: float
-    top: float
+    span: tuple[float, float, float, float]
     label: str
     low: float
     high: float
     signed: bool = False
+    peaks: bool = False
 
     @property
     def across(self) -> Array:
         """Middle of each pixel."""
-        step = (self.right - self.left) / self.values.shape[1]
-        result: Array = self.left + step * (0.5 + np.arange(self.values.shape[1]))
+        left, right, *_ = self.span
+        edges = np.linspace(left, right, self.values.shape[1] + 1)
+        result: Array = 0.5 * (edges[1:] + edges[:-1])
         return result
-
-    @property
-    def span(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top, as matplotlib's images have them."""
-        return self.left, self.right, self.bottom, self.top
 
 
 @frozen(eq=False)
@@ -113,6 +113,12 @@ class PickedLine:
     of: Map
     name: str = ""
     colour: str = BLUE
+
+    @property
+    def middle(self) -> Array:
+        """The middle line."""
+        result: Array = self.of.values[len(self.of.values) // 2]
+        return result
 
 
 Mark: TypeAlias = Curve | Shade | Steps | Bars | Stretches | Map | PickedLine
@@ -140,6 +146,18 @@ class Panel:
     def maps(self) -> list[Map]:
         """The images it shows."""
         return [mark for mark in self.marks if isinstance(mark, Map)]
+
+
+def image_row(maps: Sequence[Map], titles: Sequence[str], x: str, y: str) -> list[Panel]:
+    """Return a panel for each image."""
+    return [Panel([of], x, y, title) for of, title in zip(maps, titles, strict=True)]
+
+
+def picked_lines(
+    maps: Sequence[Map], names: Sequence[str], colours: Sequence[str] = (BLUE, ORANGE)
+) -> list[PickedLine]:
+    """Return the line that is picked of each of two images."""
+    return [PickedLine(*each) for each in zip(maps, names, colours, strict=True)]
 
 
 PanelRows: TypeAlias = Sequence[Sequence[Panel]]

@@ -16,6 +16,8 @@ NANO = 1e-9
 DIGITS = 12
 """Of a sample rate: its inverse is what a bag states, and the last digits are the division's."""
 UNSTATED = "not stated"
+SOURCE = ("record", "scan", "kind", "recorded", "rate, Hz", "samples", "inverted model")
+"""Headings of a table of records."""
 
 
 @frozen
@@ -36,6 +38,15 @@ class Source:
     samples_announced: int
     model_hash: str | None
     shortcomings: tuple[str, ...]
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of a table of records."""
+        announced, read = self.samples_announced, f"{self.samples:,}"
+        samples = read if self.samples == announced else f"{read} of {announced:,}"
+        rate, inverted = f"{self.sample_rate:.10g}", (self.model_hash or "none")[:12]
+        when = self.recorded or UNSTATED
+        return self.bag, self.scan_id, self.pattern, when, rate, samples, inverted
 
 
 @frozen

@@ -36,11 +36,17 @@ def thinned(curve: Curve, bins: int = DRAWING.stretches) -> Curve:
 
 
 def coarse(picture: Picture, finest: int) -> Picture:
-    """Return a picture whose images have no more lines and pixels: each is the mean of some."""
+    """Return a picture whose images have no more lines and pixels.
+
+    Each is the mean of some, or the largest of them in an image of peaks.
+    """
     seen: dict[int, Map] = {}
 
     def reduced(of: Map) -> Map:
-        return seen.setdefault(id(of), evolve(of, values=block_means(of.values, finest)))
+        if id(of) not in seen:
+            shown = (block_peaks if of.peaks else block_means)(of.values, finest)
+            seen[id(of)] = evolve(of, values=shown)
+        return seen[id(of)]
 
     def drawn_by(mark: Mark) -> Mark:
         if isinstance(mark, PickedLine):
@@ -57,8 +63,23 @@ def coarse(picture: Picture, finest: int) -> Picture:
 def block_means(values: Array, finest: int) -> Array:
     """Return the means of neighbouring lines and pixels, so few that none exceeds ``finest``."""
     for axis, count in enumerate(values.shape):
-        starts = np.unique(np.linspace(0, count, min(count, finest) + 1).astype(int)[:-1])
+        starts = _starts(count, finest)
         sizes = np.diff(np.append(starts, count))
         shape = (-1, 1) if axis == 0 else (1, -1)
         values = np.add.reduceat(values, starts, axis=axis) / sizes.reshape(shape)
     return values
+
+
+def block_peaks(values: Array, finest: int) -> Array:
+    """Return of neighbouring lines and pixels the value that is largest, whatever its sign."""
+    for axis, count in enumerate(values.shape):
+        starts = _starts(count, finest)
+        low, high = (f.reduceat(values, starts, axis=axis) for f in (np.fmin, np.fmax))
+        values = np.where(-low > high, low, high)
+    return values
+
+
+def _starts(count: int, finest: int) -> NDArray[np.intp]:
+    """Return where blocks begin."""
+    starts: NDArray[np.intp] = np.linspace(0, count, min(count, finest) + 1).astype(np.intp)[:-1]
+    return starts

@@ -179,24 +179,20 @@ def residual_pictures(
     The first picture has it by band, by frequency and over time, the second by what it depends on.
     """
     named = [*zip(stages, SHADES, NAMES, strict=False)]
-    bands = [Steps(_edges(limit), NANO * of.bands, name, c[0]) for of, c, name in named]
-    bands.append(Steps(_edges(limit), NANO * limit.rms, "detection limit", DARK_GREY, dashed=True))
-    record = stages[0].record
+    edges = np.array([limit.edges[1] / 10.0, *limit.edges[1:]])  # of a logarithmic axis
+    bands = [Steps(edges, NANO * of.bands, name, colours[0]) for of, colours, name in named]
+    bands.append(Steps(edges, NANO * limit.rms, "detection limit", DARK_GREY, dash="dashed"))
+    spectra, courses = ([of(*each) for each in named] for of in (_spectrum, _course))
+    record, seen = stages[0].record, "frequency of the spectrum in Hz"
     first = Picture(
         f"residual_{axis}",
         f"The residual in {axis} of {record}. Tap a band to see its spectrum.",
         (
             [
                 Panel(bands, HERTZ, "rms by band in nm", log="xy", role="bands"),
-                Panel(
-                    [_spectrum(of, colours[0], name) for of, colours, name in named],
-                    "frequency of the spectrum in Hz",
-                    "amplitude in nm",
-                    log="xy",
-                    role="spectrum",
-                ),
+                Panel(spectra, seen, "amplitude in nm", log="xy", role="spectrum"),
             ],
-            [Panel([_course(*each) for each in named], "time in s", PICKED, level=0.0)],
+            [Panel(courses, "time in s", PICKED, level=0.0)],
         ),
     )
     second = Picture(
@@ -216,21 +212,16 @@ Named = list[tuple[Description, tuple[str, str], str]]
 """Each stage with its colours and its name."""
 
 
-def _edges(limit: DetectionLimit) -> Array:
-    """Edges in Hz, the first where a logarithmic axis can begin."""
-    return np.array([limit.edges[1] / 10.0, *limit.edges[1:]])
-
-
 def _course(of: Description, colours: tuple[str, str], name: str) -> Curve:
     seconds = of.sample_period * np.arange(len(of.residual), dtype=np.float64)
     return Curve(seconds, NANO * of.residual, name, colours[0])
 
 
-def _spectrum(of: Description, colour: str, name: str) -> Curve:
+def _spectrum(of: Description, colours: tuple[str, str], name: str) -> Curve:
     """Return the amplitude at each frequency but zero."""
     count = len(of.residual)
     amplitude = 2.0 / count * np.abs(rfft(of.residual - of.residual.mean()))
-    return Curve(rfftfreq(count, of.sample_period)[1:], NANO * amplitude[1:], name, colour)
+    return Curve(rfftfreq(count, of.sample_period)[1:], NANO * amplitude[1:], name, colours[0])
 
 
 def _dependence(quantity: str, named: Named) -> Panel:
@@ -246,16 +237,13 @@ def _dependence(quantity: str, named: Named) -> Panel:
 
 
 def _lines(named: Named) -> Panel:
-    if any(stage.sides is None for stage, _, _ in named):
+    sides = [(of.sides, colours, name) for of, colours, name in named if of.sides is not None]
+    if len(sides) < len(named):
         return _dependence("travel", named)
     curves = [
-        Curve(stage.sides.place, NANO * values, f"{way}, {name}", colour)
-        for stage, colours, name in named
-        if stage.sides is not None
-        for way, values, colour in (
-            ("trace", stage.sides.trace, colours[0]),
-            ("retrace", stage.sides.retrace, colours[1]),
-        )
+        Curve(of.place, NANO * getattr(of, way), f"{way}, {name}", colour)
+        for of, colours, name in sides
+        for way, colour in zip(("trace", "retrace"), colours, strict=True)
     ]
     return Panel(curves, "place along the line", "mean line's residual in nm", level=0.0)
 
@@ -268,7 +256,7 @@ def _correlation_panel(named: Named) -> Panel:
     low, high = (np.full(2, sign * own.bootstrap) for sign in (-1.0, 1.0))
     band = Shade(ends, low, high, label)
     white = [
-        Curve(ends, np.full(2, sign * own.white), text, DARK_GREY, dashed=True)
+        Curve(ends, np.full(2, sign * own.white), text, DARK_GREY, dash="dashed")
         for sign, text in ((-1.0, ""), (1.0, "95 % band, white noise"))
     ]
     return Panel([band, *marks, *white], "lag in s", "autocorrelation", log="x")

@@ -8,12 +8,13 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.bag.reader import ScanRecording
-from afm_scan_ros.core.image_lines import LineImager, frame_of
+from afm_scan_ros.core.image_lines import LineImager, frame_of, most_pixels
+from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import DESIRED, DRIVE, within
 from afm_scan_ros.core.trajectory import TO_AND_FRO, SampleKinds, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.report.analysis import DESIRED, scan_spec
+from afm_scan_ros.report.analysis import scan_spec
 from afm_scan_ros.report.picture import (
     BLUE,
     GREY,
@@ -30,14 +31,16 @@ from afm_scan_ros.report.picture import (
     PickedLine,
     Picture,
     Stretches,
+    image_row,
+    picked_lines,
 )
 from afm_scan_ros.simulation.sample import Grating
 
 WITHOUT, WITH = "without compensation", "with compensation"
 SHOWN = 3
 """Lines in a picture, after the first."""
-DRIVE = "drive_voltage"
 TIME = "time in ms"
+WAYS = "trace", "retrace"
 LOW = 0.75
 """Height of a row where several stand above one another."""
 
@@ -89,23 +92,18 @@ def view_of(recording: ScanRecording) -> ScanExcerpt:
     """
     spec, topics = scan_spec(recording), topics_shown(recording)
     where = phases(spec).lines
-    start = where.start + spec.samples_per_line
-    stop = min(where.stop, start + SHOWN * spec.samples_per_line)
-    runs = takewhile(lambda run: run[0].first_sample < stop, recording.blocks(*topics))
-    found = [
-        [part(trace, max(start, trace.first_sample), min(stop, end(trace))) for trace in run]
-        for run in runs
-        if end(run[0]) > start
-    ]
-    joined = [_joined(start, spec, [run[i] for run in found]) for i in range(len(topics))]
+    shown = where[spec.samples_per_line :][: SHOWN * spec.samples_per_line]
+    runs = takewhile(lambda run: run[0].first_sample < shown.stop, recording.blocks(*topics))
+    nothing = Trace(shown.start, spec.sample_period, np.empty(0), np.empty(0))
+    found = [[nothing] * len(topics), *filter(None, (within(shown, run) for run in runs))]
+    desired, achieved, *drive = (_joined(traces) for traces in zip(*found, strict=True))
     kind = topics[1].partition("_")[0].replace("achieved", "measured")
-    drive = joined[2] if DRIVE in topics else None
-    return ScanExcerpt(spec, joined[0], joined[1], kind, drive)
+    return ScanExcerpt(spec, desired, achieved, kind, drive[0] if drive else None)
 
 
-def _joined(start: int, spec: ScanSpec, runs: list[Trace]) -> Trace:
-    x, y = (np.concatenate([np.empty(0), *(run.axis(axis) for run in runs)]) for axis in AXES)
-    return Trace(start, spec.sample_period, x, y)
+def _joined(runs: Sequence[Trace]) -> Trace:
+    x, y = (np.concatenate([run.axis(axis) for run in runs]) for axis in AXES)
+    return Trace(runs[0].first_sample, runs[0].sample_period, x, y)
 
 
 def tracking_picture(view: ScanExcerpt, title: str = "") -> Picture:
@@ -121,7 +119,7 @@ def tracking_picture(view: ScanExcerpt, title: str = "") -> Picture:
         if view.spec.pattern in TO_AND_FRO
         else _in_plane(view, achieved)
     )
-    driven = [_drive([(view, "")])] if view.drive else []
+    driven = [_drive(view, view.drive)] if view.drive else []
     caption = (
         f"{SHOWN} lines after the first: desired and {achieved} displacement, their difference, and"
         " the drive, over one time. Drag a box to zoom in; the panels over time zoom together."
@@ -164,12 +162,10 @@ def _over_time(
     return [paths, errors]
 
 
-def _drive(views: Sequence[tuple[ScanExcerpt, str]]) -> Panel:
+def _drive(view: ScanExcerpt, drive: Trace) -> Panel:
     """Show the drives of both axes."""
     curves = [
-        Curve(view.milliseconds, view.drive.axis(axis), f"{axis}{name}", colour)
-        for view, name in views
-        if view.drive
+        Curve(view.milliseconds, drive.axis(axis), axis, colour)
         for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)
     ]
     return Panel(curves, TIME, "drive in V")
@@ -185,24 +181,19 @@ def _stretches(view: ScanExcerpt, apart: NDArray[np.bool_]) -> list[tuple[float,
 def _against_position(view: ScanExcerpt, colours: tuple[str, str], title: str = "") -> Panel:
     kinds, position, error = view.kinds, MICRO * view.desired.x, NANO * view.error("x")
     curves = []
-    ways = {"trace": kinds.trace, "retrace": kinds.retrace}
-    for (name, mask), colour in zip(ways.items(), colours, strict=True):
-        if mask.any():
+    for way, colour in zip(WAYS, colours, strict=True):
+        if (mask := getattr(kinds, way)).any():
             breaks = np.flatnonzero(np.diff(kinds.line[mask])) + 1
             x, y = (np.insert(values[mask], breaks, np.nan) for values in (position, error))
-            curves.append(Curve(x, y, f"{name}, {title}" if title else name, colour))
+            curves.append(Curve(x, y, f"{way}, {title}" if title else way, colour))
     return Panel(curves, "desired x in µm", "x error in nm", level=0.0)
 
 
 def _in_plane(view: ScanExcerpt, achieved: str) -> Panel:
-    curves = [
-        Curve(MICRO * path.x, MICRO * path.y, name, colour, width)
-        for path, name, colour, width in (
-            (view.desired, "desired", GREY, 3.0),
-            (view.achieved, achieved, BLUE, 1.1),
-        )
-    ]
-    return Panel(curves, "x in µm", "y in µm", equal=True)
+    wanted, moved = view.desired, view.achieved
+    desired = Curve(MICRO * wanted.x, MICRO * wanted.y, "desired", GREY, 3.0)
+    shown = Curve(MICRO * moved.x, MICRO * moved.y, achieved)
+    return Panel([desired, shown], "x in µm", "y in µm", equal=True)
 
 
 GRATING = Grating(pitch=16e-6, angle=float(np.radians(25.0)))
@@ -213,13 +204,23 @@ PIXELS = 256
 class TwoScans:
     """Two scans of the same lines: the desired displacement and the achieved ones, m.
 
-    ``names`` state how each was made, as "with compensation".
+    ``displacement`` is the kind of the achieved ones: ``true`` or ``measured``. ``names`` state how
+    each was made, as "with compensation".
     """
 
     spec: ScanSpec
     desired: Trace
     achieved: tuple[Trace, Trace]
+    displacement: str
     names: tuple[str, str]
+
+    @classmethod
+    def of(cls, before: Scan, after: Scan, *names: str) -> "TwoScans":
+        """Return the true displacements where both are known, or else the measured ones."""
+        kind = "true" if before.knows_true and after.knows_true else "measured"
+        achieved = getattr(before, kind), getattr(after, kind)
+        first, second = names
+        return cls(before.spec, before.desired, achieved, kind, (first, second))
 
 
 @frozen(eq=False)
@@ -248,8 +249,8 @@ def images_of(scans: TwoScans) -> Images:
     return Images(scans.spec, ideal, (first, second), scans.names)
 
 
-def error_picture(name: str, scans: TwoScans, kind: str) -> Picture:
-    """Show the error of both axes over a few lines, of both scans; ``kind`` is the displacement."""
+def error_picture(name: str, scans: TwoScans) -> Picture:
+    """Show the error of both axes over a few lines, of both scans."""
     spec = scans.spec
     start = phases(spec).lines.start + spec.samples_per_line
     shown = slice(start, start + SHOWN * spec.samples_per_line)
@@ -263,35 +264,30 @@ def error_picture(name: str, scans: TwoScans, kind: str) -> Picture:
             )
         ]
         panels.append([Panel(curves, TIME, f"{axis} error in nm", level=0.0)])
-    return Picture(name, f"{kind} error of {SHOWN} lines of the same scan.", panels)
+    return Picture(
+        name, f"{scans.displacement.capitalize()} error of {SHOWN} lines of the same scan.", panels
+    )
 
 
 def image_picture(name: str, images: Images, caption: str) -> Picture:
     """Show the grating as each scan images it, the height error of either, and a line of them."""
-    left, right = (side * 0.5 * MICRO * images.spec.range_x for side in (-1.0, 1.0))
-    bottom, top = (side * 0.5 * MICRO * images.spec.range_y for side in (-1.0, 1.0))
+    half = 0.5 * MICRO * images.spec.range_x, 0.5 * MICRO * images.spec.range_y
+    span = -half[0], half[0], -half[1], half[1]
     wrong = [NANO * (image - images.ideal) for image in images.imaged]
     ends = float(NANO * images.ideal.min()), float(NANO * images.ideal.max())
     largest = float(np.abs(wrong).max())
-
-    def heights(values: Array) -> Map:
-        return Map(NANO * values, left, right, bottom, top, "height in nm", *ends)
-
-    def errors(values: Array) -> Map:
-        label = "height error in nm"
-        return Map(values, left, right, bottom, top, label, -largest, largest, signed=True)
-
-    x, y = "x in µm", "y in µm"
-    imaged, off = [heights(v) for v in images.imaged], [errors(v) for v in wrong]
-    names = images.names
-    line: list[Mark] = [PickedLine(heights(images.ideal), "without error", GREY)]
-    pairs = zip(names, imaged, off, (ORANGE, BLUE), strict=True)
-    line += [PickedLine(of, name, colour) for name, of, _, colour in pairs]
-    missed = [PickedLine(of, "", colour) for of, colour in zip(off, (ORANGE, BLUE), strict=True)]
+    x, y, height, error = "x in µm", "y in µm", "height in nm", "height error in nm"
+    ideal, *imaged = [Map(NANO * v, span, height, *ends) for v in (images.ideal, *images.imaged)]
+    off = [Map(v, span, error, -largest, largest, signed=True) for v in wrong]
+    line = picked_lines(imaged, images.names, (ORANGE, BLUE))
+    missed = picked_lines(off, ("", ""), (ORANGE, BLUE))
     rows = (
-        [Panel([of], x, y, f"image {name}") for name, of in zip(names, imaged, strict=True)],
-        [Panel(line, x, "height in nm"), Panel(missed, x, "height error in nm", level=0.0)],
-        [Panel([of], x, y, f"height error {name}") for name, of in zip(names, off, strict=True)],
+        image_row(imaged, [f"image {name}" for name in images.names], x, y),
+        [
+            Panel([PickedLine(ideal, "without error", GREY), *line], x, height),
+            Panel(missed, x, error, level=0.0),
+        ],
+        image_row(off, [f"height error {name}" for name in images.names], x, y),
     )
     return Picture(name, f"{caption} Tap an image to see the line there.", rows)
 
@@ -300,6 +296,6 @@ def _image(spec: ScanSpec, desired: Trace, path: Trace) -> Array:
     where = phases(spec).lines
     lines = slice(where.start, where.stop)
     heights = GRATING.height(path.x[lines], path.y[lines])
-    frame = frame_of(spec, min(PIXELS, spec.samples_per_line // 2 - 1))
+    frame = frame_of(spec, min(PIXELS, most_pixels(spec)))
     made = LineImager(spec, frame).add(desired.x[lines], heights)
     return np.stack([line.trace for line in made])

@@ -10,7 +10,7 @@ from afm_scan_ros.core.metrics import Figure as Error
 from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.model import INVERSES
 from afm_scan_ros.report.analysis import Analysis
-from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
+from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.picture import MICRO, Picture
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import Images, image_picture, tracking_picture, view_of
@@ -28,7 +28,7 @@ METHOD = (
 def scan_report(analysis: Analysis, recording: ScanRecording) -> ReportPage:
     """Return the report on a recorded scan."""
     return ReportPage(
-        title=f"Scan {analysis.scan.scan_id}",
+        title=f"Scan {analysis.name}",
         answer=list(_answer(analysis)),
         picture=tracking_picture(view_of(recording)),
         next_steps=list(_next(analysis)),
@@ -61,17 +61,18 @@ def _answer(analysis: Analysis) -> Iterator[str]:
         yield "The scan was made without compensation: each axis had one constant gain."
 
 
-def _next(analysis: Analysis) -> Iterator[CommandLine]:
-    bag = analysis.bag
+def _next(analysis: Analysis) -> Iterator[str | CommandLine]:
+    """Yield what to do; a bag states neither the file of its scan nor that of its model."""
     if analysis.shortcomings:
-        yield CommandLine("Make the whole scan again.", "afm-scan scan --spec SCAN --bag BAG")
+        yield "Make the whole scan again: 'afm-scan scan' with the same files, into a new bag."
     yield CommandLine(
-        "Find out what the model lacks, where the error is larger than you can accept.",
-        f"afm-scan diagnose {bag} --model MODEL --out diagnosis",
+        "Find out what the model lacks, where the error is larger than you can accept. Add the file"
+        " of the scanner's model as --model.",
+        ["diagnose", analysis.bag, "--out", f"{analysis.name}_diagnosis"],
     )
-    yield CommandLine(
-        "Repeat the same scan and learn what repeats of its error.",
-        "afm-scan learn --spec SCAN --model MODEL --out learned",
+    yield (
+        "Repeat the same scan and learn what repeats of its error: 'afm-scan learn' with the files"
+        " of this scan and of its model as --spec and --model."
     )
 
 
@@ -106,13 +107,20 @@ def error_rows(tracking: Tracking) -> list[TextRow]:
         "y, approach": y.approach,
         "y, preparation": y.preparation,
     }
-    rows = [_row(name, figure) for name, figure in named.items() if figure is not None]
+    rows: list[TextRow] = [
+        (name, *_sized(of.rms, of.rms_share), *_sized(of.largest, of.largest_share))
+        for name, of in named.items()
+        if of is not None
+    ]
     for axis, error in (("x", x), ("y", y)):
-        if error.repeatability is not None:
-            share = percent(error.repeatability / error.planned_range)
-            name = f"{axis}, line-to-line repeatability"
-            rows.append((name, nanometres(error.repeatability), share, "", ""))
+        if (size := error.repeatability) is not None:
+            cells = _sized(size, size / error.planned_range)
+            rows.append((f"{axis}, line-to-line repeatability", *cells, "", ""))
     return rows
+
+
+def _sized(size: float, share: float) -> tuple[str, str]:
+    return nanometres(size), percent(share)
 
 
 def scan_rows(analysis: Analysis) -> list[TextRow]:
@@ -142,16 +150,6 @@ def scan_rows(analysis: Analysis) -> list[TextRow]:
 
 def _area(x: float, y: float) -> str:
     return f"{MICRO * x:.4g} µm by {MICRO * y:.4g} µm"
-
-
-def _row(name: str, figure: Error) -> TextRow:
-    return (
-        name,
-        nanometres(figure.rms),
-        percent(figure.rms_share),
-        nanometres(figure.largest),
-        percent(figure.largest_share),
-    )
 
 
 @frozen
@@ -251,15 +249,14 @@ def demo_report(
         picture=image_picture("grating", images, caption),
         next_steps=list(commands),
         evidence=[
-            Section("Errors at each line rate, and what each inverse does", _texts(tables)),
+            Section(
+                "Errors at each line rate, and what each inverse does",
+                [table.text() for table in tables],
+            ),
             Section("Displacement and error of x and y", list(compared.values())),
             Section("Method", [DEMO_METHOD.format(ran)]),
         ],
     )
-
-
-def _texts(tables: Iterable[Table]) -> list[Part]:
-    return [table.text() for table in tables]
 
 
 def _improvement(tracked: Table) -> str:

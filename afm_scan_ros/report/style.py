@@ -5,7 +5,6 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
@@ -55,16 +54,3 @@ def blank(width: float, height: float, title: str = "") -> Figure:
     if title:
         figure.suptitle(title, x=0.01, ha="left", parse_math=False)  # a name in a file
     return figure
-
-
-def legend_above(panel: Axes, columns: int = 3) -> None:
-    """Explain what a panel shows, if anything, in rows above it."""
-    if panel.get_legend_handles_labels()[0]:
-        panel.legend(
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            ncols=columns,
-            borderaxespad=0.2,
-            columnspacing=1.0,
-            fontsize=8,
-        )

@@ -8,9 +8,9 @@ import numpy as np
 from attrs import define, field
 
 from afm_scan_ros.bag.reader import ScanRecording
-from afm_scan_ros.core.image_lines import Frame, ImageLine, LineImager, frame_of
+from afm_scan_ros.core.image_lines import Frame, ImageLine, LineImager, frame_of, most_pixels
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import end, part
+from afm_scan_ros.core.streams import within
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.analysis import scan_spec
@@ -23,11 +23,12 @@ from afm_scan_ros.report.picture import (
     Curve,
     Map,
     Panel,
-    PickedLine,
     Picture,
+    image_row,
+    picked_lines,
 )
 from afm_scan_ros.report.reduction import extremes, thinned
-from afm_scan_ros.report.scan_pictures import DRIVE, LOW, topics_shown
+from afm_scan_ros.report.scan_pictures import LOW, WAYS, topics_shown
 
 TIME = "time in s"
 
@@ -63,7 +64,8 @@ def whole_pictures(recording: ScanRecording) -> Iterator[Picture]:
     spec, topics = scan_spec(recording), topics_shown(recording)
     share = DRAWING.stretches / max(1, recording.info.total_samples)
     signals: Signals = defaultdict(lambda: _Signal(spec.sample_period, share))
-    imager = _imager(spec)
+    pixels = min(DRAWING.error_pixels, most_pixels(spec)) if spec.pattern in TO_AND_FRO else 0
+    imager = _ErrorImager(spec, frame_of(spec, pixels)) if pixels > 0 else None
     for desired, achieved, *drive in recording.blocks(*topics):
         for axis in AXES:
             error = achieved.axis(axis) - desired.axis(axis)
@@ -73,17 +75,17 @@ def whole_pictures(recording: ScanRecording) -> Iterator[Picture]:
         if imager is not None:
             imager.add(desired, achieved)
     if signals:
-        yield _course(signals, driven=DRIVE in topics)
+        yield _course(signals)
     if imager is not None and imager.lines["x"]:
         yield imager.picture()
 
 
-def _course(signals: Signals, *, driven: bool) -> Picture:
+def _course(signals: Signals) -> Picture:
     rows = [
         [Panel([signals["error", a].curve(NANO, "", BLUE)], TIME, f"{a} error in nm", level=0.0)]
         for a in AXES
     ]
-    if driven:
+    if ("drive", "x") in signals:
         drives = [
             signals["drive", axis].curve(1.0, axis, colour)
             for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)
@@ -94,16 +96,6 @@ def _course(signals: Signals, *, driven: bool) -> Picture:
         " highest sample are drawn, so that no peak is missing."
     )
     return Picture("whole", caption, rows, LOW)
-
-
-def _imager(spec: ScanSpec) -> "_ErrorImager | None":
-    """Return what images the error; None where the scan has no lines, or lines of few samples."""
-    pixels = min(
-        DRAWING.error_side, int(0.4 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
-    )
-    if spec.pattern not in TO_AND_FRO or pixels < 1:
-        return None
-    return _ErrorImager(spec, frame_of(spec, pixels))
 
 
 @define(eq=False)
@@ -120,52 +112,33 @@ class _ErrorImager:
 
     def add(self, desired: Trace, achieved: Trace) -> None:
         """Take a block."""
-        where = phases(self.spec).lines
-        start, stop = max(where.start, desired.first_sample), min(where.stop, end(desired))
-        if start >= stop:
-            return
-        wanted, moved = (part(trace, start, stop) for trace in (desired, achieved))
-        for axis, imager in self._imagers.items():
-            error = NANO * (moved.axis(axis) - wanted.axis(axis))
-            self.lines[axis] += imager.add(wanted.x, error)
+        if on_lines := within(phases(self.spec).lines, (desired, achieved)):
+            wanted, moved = on_lines
+            for axis, imager in self._imagers.items():
+                error = NANO * (moved.axis(axis) - wanted.axis(axis))
+                self.lines[axis] += imager.add(wanted.x, error)
 
     def picture(self) -> Picture:
         """Show the x error on trace and retrace as images, and both axes' error of a line."""
-        ways = ("trace", "retrace")
-        maps = {(axis, way): self._map(axis, way) for axis in AXES for way in ways}
-        x, y = "desired x in µm", "lines"
-        images = [Panel([maps["x", way]], x, y, f"x error, {way}") for way in ways]
+        x = "desired x in µm"
+        maps = {axis: self._maps(axis) for axis in AXES}
+        images = image_row(maps["x"], [f"x error, {way}" for way in WAYS], x, "line")
         lines = [
-            Panel(
-                [
-                    PickedLine(maps[axis, way], way, colour)
-                    for way, colour in zip(ways, (BLUE, ORANGE), strict=True)
-                ],
-                x,
-                f"{axis} error in nm",
-                level=0.0,
-            )
+            Panel(picked_lines(maps[axis], WAYS), x, f"{axis} error in nm", level=0.0)
             for axis in AXES
         ]
-        caption = "The error by line and place. Tap an image to see the errors of the line there."
-        if len(self.lines["x"]) > DRAWING.error_side:
-            caption += " Neighbouring lines share a row, which shows the largest of their errors."
+        caption = (
+            "The error by line and place. Tap an image to see the errors of the line there. Where a"
+            " scan has more lines than the image has rows, a row shows the largest of their errors."
+        )
         return Picture("by_line", caption, (images, lines))
 
-    def _map(self, axis: str, way: str) -> Map:
-        values = np.stack([getattr(line, way) for line in self.lines[axis]])
-        count = len(values)
-        each = ceil(count / DRAWING.error_side)
-        groups = [values[start : start + each] for start in range(0, count, each)]
-        shown = np.stack([_largest(group) for group in groups])
-        most = float(np.nanmax(np.abs(shown), initial=np.finfo(float).tiny))
-        left, right = MICRO * self.frame.left, MICRO * self.frame.right
-        label = "error in nm"
-        return Map(shown, left, right, 0.0, float(count), label, -most, most, signed=True)
-
-
-def _largest(group: Array) -> Array:
-    """Return the value of largest magnitude of each column."""
-    row = np.argmax(np.nan_to_num(np.abs(group), nan=-1.0), axis=0)
-    result: Array = group[row, np.arange(group.shape[1])]
-    return result
+    def _maps(self, axis: str) -> list[Map]:
+        """Return the error on trace and on retrace, in the same colours."""
+        both = [np.stack([getattr(line, way) for line in self.lines[axis]]) for way in WAYS]
+        most = float(np.nanmax(np.abs(both), initial=np.finfo(float).tiny))
+        span = MICRO * self.frame.left, MICRO * self.frame.right, 0.0, float(len(both[0]))
+        return [
+            Map(values, span, "error in nm", -most, most, signed=True, peaks=True)
+            for values in both
+        ]

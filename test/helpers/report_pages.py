@@ -39,7 +39,7 @@ from afm_scan_ros.report.analysis import analyse
 from afm_scan_ros.report.close_loop import close_loop_report
 from afm_scan_ros.report.diagnosis_page import diagnosis_report
 from afm_scan_ros.report.fit_page import fit_report
-from afm_scan_ros.report.page import ReportPage
+from afm_scan_ros.report.page import CommandLine, ReportPage
 from afm_scan_ros.report.provenance import Provenance, provenance_of, source_of
 from afm_scan_ros.report.scan_pictures import (
     WITH,
@@ -83,7 +83,7 @@ def of_demo(bag: Path) -> ReportPage:
     compared = {rate: comparison_picture(f"{rate:g}hz", view, view) for rate in LINE_RATES}
     with_all, without = scan(SPEC, ALL), scan(SPEC, ())
     achieved = without.true, with_all.true
-    images = images_of(TwoScans(SPEC, with_all.desired, achieved, (WITHOUT, WITH)))
+    images = images_of(TwoScans(SPEC, with_all.desired, achieved, "true", (WITHOUT, WITH)))
     commands = next_commands(Path("demo"))
     return demo_report(tables, compared, (IMAGED[0], images), commands, "in one process")
 
@@ -92,7 +92,7 @@ def of_identification() -> ReportPage:
     fitted = record(OPERATORS["plays"], levels(1, 14, 600))
     other = record(OPERATORS["plays"], levels(2, 8, 500))
     found = identify_records([fitted, evolve(other, name="check", kind="validation")])
-    return fit_report(found, "model.yaml")
+    return fit_report(found, Path("model.yaml"))
 
 
 @cache
@@ -127,7 +127,8 @@ def of_learning() -> ReportPage:
     plant = default_plant()
     plant = evolve(plant, **{n: detuned_axis(getattr(plant, n), 0.97, 0.97) for n in ("x", "y")})
     scans = list(learn(InProcessSession(plant), default_model(), SPEC, 4, plant.amplifier.limits))
-    return learning_report(scans, None, _provenance())
+    again = CommandLine("Scan again.", ["scan", "--learned", "learned.npz"])
+    return learning_report(scans, None, _provenance(), [again])
 
 
 def of_grating() -> ReportPage:
@@ -193,7 +194,7 @@ def _recording(instrument: str, night: int, rng: np.random.Generator, *, grown: 
 def of_survey(count: int = 400, instruments: int = 4) -> ReportPage:
     some = recordings(count, instruments)
     reports = {some[0].bag: "demo.html"}
-    return survey_report(Survey(some, changes(some, 0.01), 0.01), reports, NOW)
+    return survey_report(Survey(some, changes(some, 0.01), 0.01), reports, "model.yaml", NOW)
 
 
 REPORTS: dict[str, Callable[[Path], ReportPage]] = {

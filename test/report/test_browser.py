@@ -1,5 +1,6 @@
 """Each of the eight reports in a real browser, which is Debian's chromium."""
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -7,9 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from attrs import evolve
 
+from afm_scan_ros.report.page import ReportPage
+from afm_scan_ros.report.picture import Curve, Panel, Picture
 from helpers.report_pages import REPORTS, SPEC, of_scan, of_survey, recorded
 
 pytest.importorskip("playwright", reason="playwright is not installed: it drives chromium")
@@ -103,6 +107,8 @@ def test_each_report_answers_zooms_and_is_read_by_everyone(
     opened(page, file)
     _answers_above_the_fold(page)
     page.screenshot(path=file.with_suffix(".png"))
+    for command in page.locator("pre").all_inner_texts():
+        assert not re.search(r"\b[A-Z]{3,}\b", command), "a placeholder"
     _zooms_by_keys(page)
     page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
     assert serious(page) == []
@@ -177,8 +183,26 @@ def test_a_line_of_an_image_that_is_picked_shows_its_traces(page: Page, made: Ma
     page.wait_for_timeout(400)  # a tap is one only when no second one follows
     tapped = picked(page)
     assert tapped != before
-    page.locator("[data-line-of]").first.fill("1")
+    slider, number = page.locator("[data-line-of]").first, page.locator("output").first
+    assert slider.input_value() == number.inner_text() == "5"  # of six, counted from below
+    slider.fill("1")
+    assert number.inner_text() == "1"
     assert picked(page) != tapped
+
+
+def test_an_offset_is_seen_as_one(page: Page, folder: Path) -> None:
+    """The first range of an error holds zero, however far the error is from it."""
+    error = Curve(np.arange(100.0), 50.0 + np.sin(np.arange(100.0)))
+    picture = Picture("error", "", [[Panel([error], "time in s", "error in nm", level=0.0)]])
+    file = folder / "offset.html"
+    ReportPage("Offset", ["An answer."], picture, [], []).write(file, None)
+    opened(page, file)
+    start, end = page.evaluate(
+        "() => { const range = plotOf(document.querySelector('.panel')).y_range;"
+        " return [range.start, range.end]; }"
+    )
+    assert start <= 0.0
+    assert end >= 51.0
 
 
 @pytest.mark.evidence
@@ -208,6 +232,7 @@ def test_links_lead_on(page: Page, folder: Path, made: Made) -> None:
 
 def test_everything_is_printed(page: Page, made: Made) -> None:
     opened(page, made("analyze"))
+    assert page.title() == page.locator("h1").inner_text() == "Scan bag"
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("details:not([open])").count() == 0
     page.emulate_media(media="print")
@@ -242,7 +267,7 @@ def test_a_survey_is_sorted_searched_and_leads_to_its_recordings(page: Page, mad
 @pytest.mark.evidence
 def test_trends_are_those_of_the_instrument_that_is_chosen(page: Page, made: Made) -> None:
     opened(page, made("survey"))
-    values = "() => [...plotOf(document.querySelector('.panel')).renderers[3].data_source.data.y]"
+    values = "() => [...plotOf(document.querySelector('.panel')).renderers[4].data_source.data.y]"
     changed = page.evaluate(values)
     assert page.input_value("[data-variant-of]") == "afm3"
     assert max(changed) > 1.008

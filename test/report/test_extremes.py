@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from afm_scan_ros.report.picture import Curve
-from afm_scan_ros.report.reduction import block_means, extremes, thinned
+from afm_scan_ros.report.reduction import block_means, block_peaks, extremes, thinned
 
 VALUES = st.floats(-1e6, 1e6, width=32)
 CURVES = arrays.arrays(np.float64, st.integers(1, 400), elements=VALUES | st.just(np.nan))
@@ -55,3 +55,12 @@ def test_an_image_keeps_its_mean_and_none_of_its_sides_exceeds_the_finest(
         assert shown.mean() == pytest.approx(values.mean())
     assert shown.min() >= values.min() - 1e-12
     assert shown.max() <= values.max() + 1e-12
+
+
+@given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 40))
+def test_an_image_of_peaks_keeps_its_largest_value(lines: int, pixels: int, finest: int) -> None:
+    values = np.random.default_rng(lines + 100 * pixels).normal(size=(lines, pixels))
+    shown = block_peaks(values, finest)
+    assert shown.shape == (min(lines, finest), min(pixels, finest))
+    assert np.isin(shown, values).all()
+    assert np.abs(shown).max() == np.abs(values).max()

@@ -1,6 +1,7 @@
 """The fit report states of each axis what was fitted, how well, and what to beware of."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from markupsafe import escape
 from afm_scan_ros.core.identification.findings import UncertainScan
 from afm_scan_ros.core.identification.identify import Identification, identify_records
 from afm_scan_ros.report.fit_page import fit_report
-from afm_scan_ros.report.fit_pictures import response_picture
+from afm_scan_ros.report.fit_pictures import fit_picture
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.picture import Curve
 from helpers.fit_cases import FREQUENCY, GAIN, OPERATORS, levels, record
@@ -27,7 +28,7 @@ def found() -> Identification:
 
 @pytest.fixture(scope="module")
 def page(found: Identification) -> str:
-    return fit_report(found, "model.yaml").page()
+    return fit_report(found, Path("model.yaml")).page()
 
 
 def test_figures_of_merit_are_those_of_the_residuals(found: Identification) -> None:
@@ -47,7 +48,7 @@ def test_figures_of_merit_are_those_of_the_residuals(found: Identification) -> N
 
 
 def test_the_response_drawn_is_the_scanner_s(found: Identification) -> None:
-    drawn = response_picture(found).panels[0].marks
+    drawn = fit_picture(found, "response").panels[0].marks
     lines = {line.name: line for line in drawn if isinstance(line, Curve)}
     assert set(lines) == {"levels", "model"}
     frequency, size = (np.asarray(v) for v in (lines["model"].x, lines["model"].y))
@@ -72,5 +73,7 @@ def test_warnings_are_shown(found: Identification) -> None:
     axis = evolve(found.axes["x"], warnings=(UncertainScan(0.034),))
     warned = Identification({"x": axis})
     text = finding_text(UncertainScan(0.034))
-    assert f'<p class="warning">x: {escape(text)}</p>' in fit_report(warned, "model.yaml").page()
+    assert (
+        f'<p class="warning">x: {escape(text)}</p>' in fit_report(warned, Path("model.yaml")).page()
+    )
     assert fit_summary(warned)["x"]["warnings"] == [text]

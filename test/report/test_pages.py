@@ -20,10 +20,10 @@ ROOT = Path(__file__).parents[2]
 TEMPLATES = sorted((ROOT / "afm_scan_ros").rglob("templates/*.*"))
 HOSTILE = "<script>\"a\" 'b' & <b>"
 EVERY_PART = """{% extends "base.html" %}
-{% from "parts.html" import command, head, parts, row, table, warnings %}
+{% from "parts.html" import parts, table %}
 {% set title = text %}
 {% block content %}
-{{ warnings([text]) }}{{ head(text) }}{{ row(text) }}{{ table(rows) }}
+{{ table(rows) }}
 {{ parts([text, rows, line, link, listing], drawn) }}{{ parts([picture], drawn) }}
 {% endblock %}
 """
@@ -45,7 +45,7 @@ def test_no_text_is_markup(every_part: Path) -> None:
             every_part,
             text=text,
             rows=rows,
-            line=CommandLine(text, text),
+            line=CommandLine(text, [text]),
             link=PageLink(text, text),
             listing=Listing([text], [[text, text]], 1),
             picture=picture,

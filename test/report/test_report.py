@@ -19,6 +19,7 @@ from afm_scan_ros.report.paper import paper_figure, save
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_pictures import comparison_picture, tracking_picture, view_of
 from afm_scan_ros.report.scan_report import error_rows, scan_report
+from afm_scan_ros.report.whole_scan import whole_pictures
 
 OFFSET = 10e-9
 NOISE = 2e-9
@@ -144,6 +145,14 @@ def test_a_calibration_record_is_sent_to_identify(tmp_path: Path) -> None:
         pass
     with pytest.raises(InputError, match=r"'creep'.*afm-scan identify"):
         analyse(read_scan(tmp_path / "bag"))
+
+
+def test_trace_and_retrace_have_one_scale_of_colours(bag: Path) -> None:
+    _, by_line = whole_pictures(read_scan(bag))
+    trace, retrace = (panel.maps[0] for panel in by_line.rows[0])
+    assert (trace.low, trace.high) == (retrace.low, retrace.high)
+    assert trace.high == max(np.abs(trace.values).max(), np.abs(retrace.values).max())
+    assert by_line.lines == 6
 
 
 @pytest.mark.evidence

@@ -1,6 +1,6 @@
 """``afm-scan grating``: the model of a scanner without a sensor, from images of a grating."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -30,6 +30,7 @@ from afm_scan_ros.features.images.report import (
 )
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
+from afm_scan_ros.report.page import CommandLine
 from afm_scan_ros.report.paper import paper_figure, save
 from afm_scan_ros.report.terminal import say
 
@@ -125,8 +126,14 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     say(f"{out} holds the model: {held}.")
     if report is not None:
         deviation = deviation_picture(used, found.positions)
-        made = grating_report(table, used, found.corrected, deviation, known, advice)
-        made.write(report, figures)
+        options = {
+            "--volts-per-um": scale and f"{scale:g}",
+            "--accuracy": f"{accuracy:g}",
+            "--line-time": line_time and f"{line_time:g}s",
+        }
+        again = _correction_of_another(images, pitch, out, options)
+        pages = grating_report(table, used, found.corrected, deviation, known, [*advice, again])
+        pages.write(report, figures)
     if folder is not None:
         table.save(folder)
         for image, better in zip(used, found.corrected, strict=True):
@@ -134,6 +141,19 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         for target, image in zip(targets[len(given) :], others, strict=True):
             _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
         say(f"{folder} holds the corrected images, their pictures and the table.")
+
+
+def _correction_of_another(
+    images: Sequence[Path], pitch: float, out: Path, options: Mapping[str, str | float | None]
+) -> CommandLine:
+    """Return the same command, for another image and with other results."""
+    given = [word for name, value in options.items() if value for word in (name, value)]
+    model, folder = (out.with_name(f"{out.stem}_{name}") for name in (f"2{out.suffix}", "images"))
+    written = ["--out", model, "--images", folder]
+    return CommandLine(
+        "Correct another image of this scanner. Add its file as --correct.",
+        ["grating", *images, "--pitch", f"{PER_MICROMETRE * pitch:g}um", *given, *written],
+    )
 
 
 def _known(effects: BaseEffects, drive: str) -> Iterator[str]:

@@ -23,10 +23,12 @@ from afm_scan_ros.report.picture import (
     Curve,
     Map,
     Panel,
-    PickedLine,
     Picture,
+    image_row,
+    picked_lines,
 )
-from afm_scan_ros.report.table import Row, Table
+from afm_scan_ros.report.scan_pictures import WAYS
+from afm_scan_ros.report.table import Table
 
 COLUMNS = {
     "image": ("image", ""),
@@ -37,15 +39,15 @@ COLUMNS = {
     "upper": ("to", ".4f"),
     "unit": ("unit", ""),
 }
+KEPT = "axis", "value", "lower", "upper", "unit"
+"""Columns that are attributes of a figure."""
 FASTER = 10.0
 """Line rate to record next over that of the images."""
 TOGETHER = "upwards and downwards"
-MEANS = {"x": "lines", "y": "pixels of a line"}
-"""What the motion of an axis is the mean over."""
 SHOWN = 1.0, 99.0
 """Percentiles of the values at which the colours end, so that a spike does not hide the rest."""
 ROWS = "as recorded", "corrected"
-SIDES = "trace", "retrace", "trace minus retrace"
+SIDES = *WAYS, "trace minus retrace"
 X = "x in µm"
 
 
@@ -63,25 +65,17 @@ def grating_table(
     """
     names = [Path(image.name).name for image in images]
     pairs = [*zip(names, figures, strict=True), (TOGETHER, drift)]
-    rows = [_row(name, each) for name, every in pairs for each in every]
+    rows = [
+        {"image": name, "figure": each.name, **{key: getattr(each, key) for key in KEPT}}
+        for name, every in pairs
+        for each in every
+    ]
     title = "What the images show of the scanner"
     if refused:
         title += f" (not used: {'; '.join(refused)})"
     return Table(
         "grating", title, COLUMNS, rows, lambda: paper_figure(deviation_picture(images, positions))
     )
-
-
-def _row(image: str, figure: ImageQuantity) -> Row:
-    return {
-        "image": image,
-        "axis": figure.axis,
-        "figure": figure.name,
-        "value": figure.value,
-        "lower": figure.lower,
-        "upper": figure.upper,
-        "unit": figure.unit,
-    }
 
 
 def left_out(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Iterator[str]:
@@ -128,24 +122,28 @@ def _followed(image: ScanImage) -> float:
 
 def deviation_picture(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Picture:
     """Show how far x and y of each image are from the commanded positions."""
-    rows = []
-    for image, each in zip(images, positions, strict=True):
-        ranges, name = (image.range_x, image.range_y), Path(image.name).name
-        row = []
-        for axis, size, count in zip(AXES, ranges, (image.pixels, image.lines), strict=True):
-            number, commanded = AXES.index(axis), 0.5 * size * middles(count)
-            curves = [
-                Curve(MICRO * commanded, MICRO * (place - commanded), side, colour, width)
-                for place, colour, width, side in (  # the thinner one shows where they coincide
-                    (each.trace[..., number].mean(axis=number), BLUE, 2.0, "trace"),
-                    (each.retrace[..., number].mean(axis=number), ORANGE, 0.8, "retrace"),
-                )
-            ]
-            label = f"deviation of {axis} in µm"
-            title = f"{name}: {axis}, mean over the {MEANS[axis]}"
-            row.append(Panel(curves, f"commanded {axis} in µm", label, title, level=0.0))
-        rows.append(row)
-    return Picture("deviation", "How far x and y are from the commanded positions.", rows)
+    rows = [
+        [_deviation(image, each, axis) for axis in AXES]
+        for image, each in zip(images, positions, strict=True)
+    ]
+    caption = (
+        "How far x and y are from the commanded positions: the mean of x over the lines, that of y"
+        " over the pixels of a line."
+    )
+    return Picture("deviation", caption, rows)
+
+
+def _deviation(image: ScanImage, found: Positions, axis: str) -> Panel:
+    number = AXES.index(axis)
+    size, count = ((image.range_x, image.pixels), (image.range_y, image.lines))[number]
+    commanded = 0.5 * size * middles(count)
+    curves = []
+    for way, colour, width in zip(WAYS, (BLUE, ORANGE), (2.0, 0.8), strict=True):  # both are seen
+        deviation = getattr(found, way)[..., number].mean(axis=number) - commanded
+        curves.append(Curve(MICRO * commanded, MICRO * deviation, way, colour, width))
+    title = f"{Path(image.name).name}: {axis}"
+    x, y = f"commanded {axis} in µm", f"deviation of {axis} in µm"
+    return Panel(curves, x, y, title, level=0.0)
 
 
 def correction_picture(before: ScanImage, after: ScanImage) -> Picture:
@@ -154,46 +152,26 @@ def correction_picture(before: ScanImage, after: ScanImage) -> Picture:
     The parabola in x and y that fits an image best is subtracted. Both rows have the same colours.
     Both images hold a retrace.
     """
-    factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
-    rows = [_images(image, factor) for image in (before, after)]
-    heights = _percentiles(values for row in rows for values in row[:2])
-    widest = _percentiles(np.abs(row[2]) for row in rows)[1]
-    name = Path(before.name).name
-    maps = [
-        [
-            *(_map(image, values, unit, *heights) for values in row[:2]),
-            _map(image, row[2], unit, -widest, widest, signed=True),
-        ]
-        for image, row in zip((before, after), rows, strict=True)
-    ]
-    panels = [
-        [Panel([of], X, "y in µm", f"{side}, {state}") for of, side in zip(row, SIDES, strict=True)]
-        for row, state in zip(maps, ROWS, strict=True)
-    ]
-    lines = [
-        Panel(
-            [
-                PickedLine(of, side, colour)
-                for of, side, colour in zip(row, SIDES[:2], (BLUE, ORANGE), strict=False)
-            ],
-            X,
-            f"{before.channel} in {unit}",
-            f"a line, {state}",
-        )
-        for row, state in zip(maps, ROWS, strict=True)
-    ]
+    unit, recorded = _heights(before)
+    corrected = _heights(after)[1]
+    every = recorded, corrected
+    ends = _percentiles(values for row in every for values in row[:2])
+    widest = _percentiles(np.abs(row[2]) for row in every)[1]
+    span = 0.0, MICRO * before.range_x, 0.0, MICRO * before.range_y
+    images, lines = [], []
+    for row, state in zip(every, ROWS, strict=True):
+        maps = [Map(values, span, unit, *ends) for values in row[:2]]
+        difference = Map(row[2], span, unit, -widest, widest, signed=True)
+        titles = [f"{side}, {state}" for side in SIDES]
+        images.append(image_row([*maps, difference], titles, X, "y in µm"))
+        picked, label = picked_lines(maps, WAYS), f"{before.channel} in {unit}"
+        lines.append(Panel(picked, X, label, f"a line, {state}"))
+    name = Path(before.name)
     caption = (
-        f"{name} as it was recorded and as the model corrects it, without its parabola. Tap an"
+        f"{name.name} as it was recorded and as the model corrects it, without its parabola. Tap an"
         " image to see the line there."
     )
-    return Picture(Path(before.name).stem, caption, [*panels, lines], title=name)
-
-
-def _map(
-    image: ScanImage, values: Array, unit: str, low: float, high: float, *, signed: bool = False
-) -> Map:
-    right, top = MICRO * image.range_x, MICRO * image.range_y
-    return Map(values, 0.0, right, 0.0, top, unit, low, high, signed)
+    return Picture(name.stem, caption, [*images, lines], title=name.name)
 
 
 def grating_report(
@@ -202,25 +180,23 @@ def grating_report(
     corrected: Sequence[ScanImage | None],
     deviation: Picture,
     known: Sequence[str],
-    advice: Sequence[str],
+    advice: Sequence[str | CommandLine],
 ) -> ReportPage:
     """Return the report on a scanner identified from ``images``.
 
-    ``known`` says what the model holds, ``advice`` what the images cannot tell, and which can.
+    ``known`` says what the model holds, ``advice`` what the images cannot tell, which can, and what
+    to do next.
     """
     pairs = [(a, b) for a, b in zip(images, corrected, strict=True) if b is not None]
     pictures = [*(correction_picture(a, b) for a, b in pairs), deviation]
     return ReportPage(
         title="A scanner identified from images of a grating",
-        answer=[*_answers(pairs), "The model corrects other images of this scanner too."],
-        picture=pictures[0],
-        next_steps=[
-            *advice,
-            CommandLine(
-                "Correct another image of this scanner.",
-                "afm-scan grating IMAGE --pitch PITCH --out MODEL --correct OTHER --images FOLDER",
-            ),
+        answer=[
+            *(_answer(*pair) for pair in pairs[:1]),
+            "The model corrects other images of this scanner too.",
         ],
+        picture=pictures[0],
+        next_steps=advice,
         evidence=[
             Section("What the model holds", known),
             Section("Figures of each image, with 95 % intervals", [table.text()]),
@@ -229,22 +205,21 @@ def grating_report(
     )
 
 
-def _answers(pairs: Sequence[tuple[ScanImage, ScanImage]]) -> Iterator[str]:
-    """Say how far trace and retrace of the first image differ, before and after correction."""
-    for before, after in pairs[:1]:
-        factor, unit = (NANO, "nm") if before.unit == "m" else (1.0, before.unit)
-        differences = [
-            f"{np.sqrt(np.mean(_images(image, factor)[2] ** 2)):.3g}" for image in (before, after)
-        ]
-        yield (
-            f"Trace and retrace of {Path(before.name).name} differ by {differences[0]} {unit} rms"
-            f" as recorded, and by {differences[1]} {unit} after correction."
-        )
+def _answer(before: ScanImage, after: ScanImage) -> str:
+    """Say how far trace and retrace of an image differ, before and after correction."""
+    (unit, recorded), (_, corrected) = _heights(before), _heights(after)
+    first, then = (f"{np.sqrt(np.mean(row[2] ** 2)):.3g}" for row in (recorded, corrected))
+    return (
+        f"Trace and retrace of {Path(before.name).name} differ by {first} {unit} rms as recorded,"
+        f" and by {then} {unit} after correction."
+    )
 
 
-def _images(image: ScanImage, factor: float) -> tuple[Array, Array, Array]:
+def _heights(image: ScanImage) -> tuple[str, tuple[Array, Array, Array]]:
+    """Return the unit of trace, retrace and their difference, and these without their parabola."""
+    factor, unit = (NANO, "nm") if image.unit == "m" else (1.0, image.unit)
     trace, retrace = (factor * levelled(np.asarray(v)) for v in (image.trace, image.retrace))
-    return trace, retrace, trace - retrace
+    return unit, (trace, retrace, trace - retrace)
 
 
 def _percentiles(values: Iterable[Array]) -> tuple[float, float]:

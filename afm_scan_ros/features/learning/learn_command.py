@@ -1,5 +1,6 @@
 """``afm-scan learn``: repeat a scan, and learn a correction of its reference."""
 
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -28,6 +29,7 @@ from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
+from afm_scan_ros.report.page import CommandLine
 from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
@@ -89,12 +91,13 @@ def learn(
         failure = str(error) or "interrupted"
     made = provenance_of(model, base, session.sources, datetime.now(UTC))
     save_learned(out / "learned.npz", loop.best_of(done).correction, base)
-    write = partial(_write, out, done, of=made, failure=failure, figures=figures)
-    write(None)
+    commands = list(_next_commands(spec, model, driven, out))
+    write = partial(_write, out, done, made, commands, failure=failure, figures=figures)
+    write(taught=None)
     show(learning_text(done))
     if diagnosed and not failure:
         taught = _taught(base, done, out, made)
-        write(taught)
+        write(taught=taught)
         show(taught_text(taught))
     say(f"Report: {out / 'report.html'}. Correction: {out / 'learned.npz'}.")
     if isinstance(ended, KeyboardInterrupt):
@@ -115,15 +118,32 @@ def _taught(
     return Taught(found, loop.lacking(model, best), loop.lacking(found.model, best))
 
 
+def _next_commands(
+    spec: Path, model: Path, driven: DrivenScanner, out: Path
+) -> Iterator[CommandLine]:
+    """Yield what to do with what was learned."""
+    files = ["--spec", spec, "--model", model, *driven.options]
+    yield CommandLine(
+        "Make the same scan with the correction.",
+        ["scan", *files, "--learned", out / "learned.npz", "--bag", out / "bags/learned"],
+    )
+    yield CommandLine(
+        "Find out which effect the model lacks, so that other scans are better too.",
+        ["learn", *files, "--diagnose", "--out", out.with_name(f"{out.name}_diagnosed")],
+    )
+
+
 def _write(
     out: Path,
     done: list[loop.LearningScan],
-    taught: Taught | None,
     of: Provenance,
+    commands: Iterable[CommandLine],
+    *,
+    taught: Taught | None,
     failure: str,
     figures: str | None,
 ) -> None:
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
-    learning_report(done, taught, of, failure).write(out / "report.html", figures)
+    learning_report(done, taught, of, commands, failure).write(out / "report.html", figures)

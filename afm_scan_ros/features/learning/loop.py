@@ -1,6 +1,6 @@
 """Learning over repeated scans: scan, correct the reference, and scan again."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -204,7 +204,7 @@ class _DriveLimits:
         return True
 
 
-def best_of(scans: list[LearningScan]) -> LearningScan:
+def best_of(scans: Sequence[LearningScan]) -> LearningScan:
     """Return the scan with the least error, both axes in quadrature."""
     return min(scans, key=lambda done: sum(error**2 for error in done.errors.values()))
 

@@ -1,8 +1,7 @@
 """The report on a learned scan: rows, sentences, pictures and the page."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from attrs import frozen
@@ -12,6 +11,7 @@ from afm_scan_ros.core.metrics import Figure as ErrorFigure
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.features.learning.loop import LearningScan, best_of
+from afm_scan_ros.report.diagnosis_json import Document
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
 from afm_scan_ros.report.page import CommandLine, ReportPage, Section
@@ -20,8 +20,6 @@ from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import TwoScans, error_picture
 from afm_scan_ros.report.table import Part, Rows
-
-Document = dict[str, Any]
 
 HEADINGS = (
     "scan",
@@ -34,6 +32,7 @@ HEADINGS = (
     "share of error\nlearned",
 )
 DISPLACEMENTS = ("measured", "true")
+NAMES = ("with the model's inverse", "with the learned correction")
 
 
 @frozen(eq=False)
@@ -67,12 +66,12 @@ def learning_rows(scans: Sequence[LearningScan]) -> Iterator[tuple[str, ...]]:
 def learning_text(scans: Sequence[LearningScan]) -> Iterator[Part]:
     """Yield what learning reached, as sentences and a table."""
     yield Rows(HEADINGS, learning_rows(scans))
-    best, first = best_of(list(scans)), scans[0]
+    best, first = best_of(scans), scans[0]
     for axis in AXES:
         yield (
             f"{axis}: measured error {nanometres(first.errors[axis])} nm rms before,"
             f" {nanometres(best.errors[axis])} nm in the best scan, number"
-            f" {_number(scans, best)}."
+            f" {scans.index(best) + 1}."
         )
     yield from _limits(scans)
 
@@ -119,7 +118,7 @@ def taught_text(taught: Taught) -> Iterator[Part]:
 def learning_document(scans: Sequence[LearningScan], taught: Taught | None) -> Document:
     """Return the whole as JSON has it, in SI units."""
     document: Document = {
-        "best_scan": _number(scans, best_of(list(scans))),
+        "best_scan": scans.index(best_of(scans)) + 1,
         "scans": [_scan(done) for done in scans],
         "diagnosis": None,
     }
@@ -143,13 +142,19 @@ METHOD = (
 
 
 def learning_report(
-    scans: Sequence[LearningScan], taught: Taught | None, of: Provenance, failure: str = ""
+    scans: Sequence[LearningScan],
+    taught: Taught | None,
+    of: Provenance,
+    commands: Iterable[CommandLine],
+    failure: str = "",
 ) -> ReportPage:
-    """Return the report on the scans; ``failure`` ended them, if any."""
-    best = best_of(list(scans))
-    table, *sentences = learning_text(scans)
-    kind = "True" if scans[0].scan.knows_true else "Measured"
-    sections = [Section("Errors of each scan", [table, *sentences])]
+    """Return the report on the scans; ``failure`` ended them, if any.
+
+    ``commands`` are those to be given next.
+    """
+    best = best_of(scans)
+    compared = TwoScans.of(scans[0].scan, best.scan, *NAMES)
+    sections = [Section("Errors of each scan", list(learning_text(scans)))]
     sections.append(Section("Error by scan", [history_picture(scans)]))
     if best.steps:
         sections.append(Section("What was learned, by frequency", [spectrum_picture(best)]))
@@ -158,8 +163,8 @@ def learning_report(
     return ReportPage(
         title="A scan learned from its errors",
         answer=list(_answer(scans, best)),
-        picture=error_picture("lines", _two(scans[0], best), kind),
-        next_steps=[*_next(), *(next_steps(taught.diagnosis) if taught else ())],
+        picture=error_picture("lines", compared),
+        next_steps=[*commands, *(next_steps(taught.diagnosis) if taught else ())],
         evidence=[*sections, Section("Method", [METHOD])],
         warnings=[f"Learning ended early: {failure}."] if failure else [],
         provenance=of,
@@ -178,18 +183,7 @@ def _answer(scans: Sequence[LearningScan], best: LearningScan) -> Iterator[str]:
         noise = [f"{nanometres(tests[-1][axis].noise)} nm rms in {axis}" for axis in AXES]
         yield f"What does not repeat from scan to scan is {' and '.join(noise)}."
     else:
-        yield f"The best is scan {_number(scans, best)} of {len(scans)}."
-
-
-def _next() -> Iterator[CommandLine]:
-    yield CommandLine(
-        "Make the same scan with the correction.",
-        "afm-scan scan --spec SCAN --model MODEL --learned learned.npz --bag BAG",
-    )
-    yield CommandLine(
-        "Find out which effect the model lacks, so that other scans are better too.",
-        "afm-scan learn --diagnose --out OTHER",
-    )
+        yield f"The best is scan {scans.index(best) + 1} of {len(scans)}."
 
 
 def history_picture(scans: Sequence[LearningScan]) -> Picture:
@@ -197,15 +191,13 @@ def history_picture(scans: Sequence[LearningScan]) -> Picture:
     numbers = np.arange(1.0, len(scans) + 1.0)
     panels = []
     for axis in AXES:
-        errors = [_errors(done, axis) for done in scans]
         curves = []
-        for name, colour, each in zip(
-            DISPLACEMENTS, (ORANGE, BLUE), zip(*errors, strict=True), strict=True
-        ):
-            rms = [NANO * one.rms for one in each if one is not None]
+        every = zip(*(_errors(done, axis) for done in scans), strict=True)
+        for errors, name, colour in zip(every, DISPLACEMENTS, (ORANGE, BLUE), strict=True):
+            rms = np.array([NANO * one.rms for one in errors if one is not None])
             if len(rms) == len(scans):
-                curves.append(Curve(numbers, np.array(rms), name, colour))
-                curves.append(Curve(numbers, np.array(rms), "", colour, dots=True))
+                curves.append(Curve(numbers, rms, name, colour))
+                curves.append(Curve(numbers, rms, "", colour, dots=True))
         panels.append(Panel(curves, "scan", "error in nm rms", f"{axis}, at constant speed", "y"))
     return Picture("history", "Error by scan. Measured errors hold noise.", [panels])
 
@@ -236,37 +228,22 @@ def spectrum_picture(done: LearningScan) -> Picture:
 
 def _scan(done: LearningScan) -> Document:
     return {
-        "tracking": {
-            name: plain(done.scan.tracking(name)) for name in DISPLACEMENTS if _known(done, name)
-        },
+        "tracking": {name: plain(done.scan.tracking(name)) for name in _known(done)},
         "convergence": {axis: plain(test) for axis, test in done.convergence.items()},
         "restored": list(done.restored),
         "whole_correction": done.price == 0.0,
     }
 
 
-def _known(done: LearningScan, displacement: str) -> bool:
-    return displacement == DISPLACEMENTS[0] or done.scan.knows_true
+def _known(done: LearningScan) -> tuple[str, ...]:
+    return DISPLACEMENTS if done.scan.knows_true else DISPLACEMENTS[:1]
 
 
 def _errors(done: LearningScan, axis: str) -> list[ErrorFigure | None]:
     """Error at constant speed: measured, and true where it is known."""
-    return [
-        getattr(done.scan.tracking(name), axis).constant_speed if _known(done, name) else None
-        for name in DISPLACEMENTS
-    ]
+    errors = [getattr(done.scan.tracking(n), axis).constant_speed for n in _known(done)]
+    return [*errors, None][: len(DISPLACEMENTS)]
 
 
 def _rms(figure: ErrorFigure | None) -> str:
     return "-" if figure is None else nanometres(figure.rms)
-
-
-def _number(scans: Sequence[LearningScan], one: LearningScan) -> int:
-    return next(k for k, done in enumerate(scans, 1) if done is one)
-
-
-def _two(first: LearningScan, best: LearningScan) -> TwoScans:
-    known = first.scan.knows_true
-    achieved = [done.scan.true if known else done.scan.measured for done in (first, best)]
-    names = ("with the model's inverse", "with the learned correction")
-    return TwoScans(first.scan.spec, first.scan.desired, (achieved[0], achieved[1]), names)

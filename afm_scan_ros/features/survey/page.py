@@ -29,6 +29,8 @@ from afm_scan_ros.report.scan_pictures import LOW
 from afm_scan_ros.report.table import Part, Rows
 
 NANO = 1e-9
+PLACE = "{instrument}"
+"""What stands for an instrument in the name of a model's file."""
 QUANTITIES = {
     "gain": "gain of {}",
     "resonance": "first resonance of {}",
@@ -104,8 +106,13 @@ SHOWN = LISTED.index("residual, nm")
 """Columns of the table of recordings; the others are seen in a row that is opened."""
 
 
-def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> ReportPage:
-    """Return the report; ``reports`` are the addresses of those of single bags."""
+def survey_report(
+    found: Survey, reports: Mapping[str, str], model: str, now: datetime
+) -> ReportPage:
+    """Return the report; ``reports`` are the addresses of those of single bags.
+
+    ``PLACE`` in the name of the ``model`` file stands for the instrument.
+    """
     recordings = found.recordings
     versions = sorted({each.version for each in recordings})
     models = sorted({each.model for each in recordings})
@@ -116,7 +123,7 @@ def survey_report(found: Survey, reports: Mapping[str, str], now: datetime) -> R
         title="Survey of recordings",
         answer=list(_answer(found)),
         picture=_trends(found),
-        next_steps=list(_next(found)),
+        next_steps=list(_next(found, model)),
         evidence=[
             Section("Recordings", [listing], opened=True),
             *([Section("Changes", changes)] if found.changes else []),
@@ -145,19 +152,18 @@ def _answer(found: Survey) -> Iterator[str]:
         yield f"The surest: {alert(some).removeprefix('alert: ')}."
 
 
-def _next(found: Survey) -> Iterator[CommandLine]:
+def _next(found: Survey, model: str) -> Iterator[str | CommandLine]:
     for name, some in list(found.changed.items())[:1]:
-        after = [
-            r for r in found.recordings if r.instrument == name and r.recorded >= some[0].before
-        ]
-        bags = " ".join(each.bag for each in after[:2]) or "BAG"
+        of_it = (r for r in found.recordings if r.instrument == name)
+        bags = [r.bag for r in of_it if r.recorded >= some[0].before][:2]
+        file = model.replace(PLACE, name)
         yield CommandLine(
             f"Find out what changed of {name}, by recordings after the change together.",
-            f"afm-scan diagnose {bags} --model MODEL --out diagnosis",
+            ["diagnose", *bags, "--model", file, "--out", f"{name}_diagnosis"],
         )
-    yield CommandLine(
-        "Go on as recordings come in, with a report of each.",
-        "afm-scan survey FOLDER --model MODEL --out SURVEY --reports --watch",
+    yield (
+        "Go on as recordings come in, with a report of each: give the command of this survey again,"
+        " with --reports and --watch."
     )
 
 
@@ -265,8 +271,9 @@ def _trend(
         Bars(times, values / noise, values * noise, "", BLUE, 2.0),
         Curve(times, values, "", BLUE, dots=True),
     ]
-    label = QUANTITIES[name].format(axis)
-    return Panel(marks, "time", "over the model's", label, level=1.0, dates=True)
+    over = "over its limit" if name == RESIDUAL else "over the model's"
+    title = QUANTITIES[name].format(axis)
+    return Panel(marks, "time", over, title, level=1.0, dates=True)
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:

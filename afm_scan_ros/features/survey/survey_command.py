@@ -19,7 +19,7 @@ from afm_scan_ros.features.survey.assignment import Assignment, model_digest, su
 from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
 from afm_scan_ros.features.survey.changes import changes
 from afm_scan_ros.features.survey.folder import TABLE, SurveyFolder, require_parquet
-from afm_scan_ros.features.survey.page import Survey, alert, summary, survey_report
+from afm_scan_ros.features.survey.page import PLACE, Survey, alert, summary, survey_report
 from afm_scan_ros.features.survey.recording import Recording
 from afm_scan_ros.features.survey.workers import Outcome, WorkerOptions, worker_options
 from afm_scan_ros.model import load_model
@@ -28,7 +28,6 @@ from afm_scan_ros.report.terminal import say
 
 PAGE, REPORTS = "survey.html", "reports"
 FALSE_ALARM = 0.01
-PLACE = "{instrument}"
 Run = Callable[[Sequence[Assignment]], Iterator[Outcome[Assignment, Recording]]]
 
 
@@ -128,7 +127,7 @@ class Surveyor:
     def _written(self, recordings: Sequence[Recording]) -> Survey:
         found = Survey(recordings, changes(recordings, self.false_alarm), self.false_alarm)
         self.folder.save_table(recordings)
-        made = survey_report(found, self._reports(recordings), datetime.now(UTC))
+        made = survey_report(found, self._reports(recordings), self.model, datetime.now(UTC))
         made.write(self.folder.path / PAGE, self.figures)
         return found
 

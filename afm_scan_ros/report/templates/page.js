@@ -39,6 +39,7 @@ for (const control of document.querySelectorAll("[data-line-of]")) {
     const line = drawing().get_model_by_name(`line of ${control.dataset.lineOf}`);
     const [bottom, top] = line.tags;
     line.location = bottom + (top - bottom) * (control.value - 0.5) / control.max;
+    control.nextElementSibling.value = control.value;
   });
 }
 for (const control of document.querySelectorAll("[data-variant-of]")) {
@@ -48,7 +49,7 @@ for (const control of document.querySelectorAll("[data-variant-of]")) {
       const plot = plotOf(panel);
       plot.renderers.forEach((each, number) => {
         const other = plot.tags.find(tag => tag.name === `${control.value}/${number}`);
-        each.data_source.data = other.data;
+        if (other) { each.data_source.data = other.data; }
       });
     }
   });
