@@ -131,7 +131,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
             "--accuracy": f"{accuracy:g}",
             "--line-time": line_time and f"{line_time:g}s",
         }
-        again = _correction_of_another(images, pitch, out, options)
+        again = correction_of_another(images, pitch, out, options)
         pages = grating_report(table, used, found.corrected, deviation, known, [*advice, again])
         pages.write(report, figures)
     if folder is not None:
@@ -143,7 +143,7 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         say(f"{folder} holds the corrected images, their pictures and the table.")
 
 
-def _correction_of_another(
+def correction_of_another(
     images: Sequence[Path], pitch: float, out: Path, options: Mapping[str, str | float | None]
 ) -> CommandLine:
     """Return the same command, for another image and with other results."""

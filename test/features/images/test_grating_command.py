@@ -16,7 +16,9 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.files.formats import read_image
 from afm_scan_ros.features.images.grating.features import levelled
+from afm_scan_ros.features.images.grating_command import correction_of_another
 from afm_scan_ros.model import load_model
+from helpers.given_commands import refuse_unknown
 
 PACKAGE = find_spec("NSFopen")
 FOLDER = Path(PACKAGE.origin or "").parent / "example/Plane_Removal" if PACKAGE else Path()
@@ -51,6 +53,16 @@ def shift(one: Array, other: Array, left: int, right: int, reach: int) -> float:
     k = int(np.clip(likeness.argmax(), 1, len(steps) - 2))
     before, at, after = likeness[k - 1 : k + 2]
     return float(steps[k] + 0.5 * (before - after) / (before - 2.0 * at + after))
+
+
+def test_the_command_that_corrects_another_image_can_be_given() -> None:
+    given = {"--volts-per-um": None, "--accuracy": "2", "--line-time": "1.5s"}
+    command = correction_of_another([Path("a b.nid")], 1e-5, Path("out/model.yaml"), given)
+    assert command.line == (
+        "afm-scan grating 'a b.nid' --pitch 10um --accuracy 2 --line-time 1.5s"
+        " --out out/model_2.yaml --images out/model_images"
+    )
+    refuse_unknown(command.line)
 
 
 @pytest.mark.evidence

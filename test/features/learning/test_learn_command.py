@@ -21,6 +21,7 @@ from afm_scan_ros.files import share_directory, yaml
 from afm_scan_ros.files.learned_file import load_learned
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
+from helpers.given_commands import commands_of
 from helpers.in_process import InProcessSession, default_model, default_plant
 from helpers.stage import stage
 
@@ -73,6 +74,9 @@ def test_report_table_and_correction_agree(tmp_path: Path) -> None:
     page = (tmp_path / "out/report.html").read_text("utf-8")
     assert page.count("<figure>") == 3
     assert f"number {found['best_scan']}" in page
+    again, diagnosed = commands_of(page)
+    assert again[-4:-1] == ["--learned", str(tmp_path / "out/learned.npz"), "--bag"]
+    assert diagnosed[1:4] == ["learn", "--spec", str(tmp_path / "spec.yaml")]
 
 
 @pytest.mark.evidence
