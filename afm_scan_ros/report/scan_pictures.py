@@ -34,6 +34,7 @@ from afm_scan_ros.report.picture import (
     image_row,
     picked_lines,
 )
+from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.simulation.sample import Grating
 
 WITHOUT, WITH = "without compensation", "with compensation"
@@ -269,8 +270,11 @@ def error_picture(name: str, scans: TwoScans) -> Picture:
     )
 
 
-def image_picture(name: str, images: Images, caption: str) -> Picture:
-    """Show the grating as each scan images it, the height error of either, and a line of them."""
+def image_picture(name: str, images: Images, how: str) -> Picture:
+    """Show the grating as each scan images it, the height error of either, and a line of them.
+
+    ``how`` says how it was scanned, as "at 30 Hz with 64 lines".
+    """
     half = 0.5 * MICRO * images.spec.range_x, 0.5 * MICRO * images.spec.range_y
     span = -half[0], half[0], -half[1], half[1]
     wrong = [NANO * (image - images.ideal) for image in images.imaged]
@@ -289,7 +293,14 @@ def image_picture(name: str, images: Images, caption: str) -> Picture:
         ],
         image_row(off, [f"height error {name}" for name in images.names], x, y),
     )
-    return Picture(name, f"{caption} Tap an image to see the line there.", rows)
+    pairs = zip(images.errors, images.names, strict=True)
+    errors = " and ".join(f"{nanometres(error)} nm rms {name}" for error, name in pairs)
+    caption = (
+        f"A simulated grating of 16 µm pitch and 100 nm height, scanned {how}. Each height is drawn"
+        f" at the desired position. The height error is {errors}. Tap an image to see the line"
+        " there."
+    )
+    return Picture(name, caption, rows)
 
 
 def _image(spec: ScanSpec, desired: Trace, path: Trace) -> Array:

@@ -234,11 +234,7 @@ def demo_report(
     """Return the report on the demonstration; ``ran`` says how the scans ran."""
     scan, images = imaged
     without, compensated = (nanometres(error) for error in images.errors)
-    caption = (
-        "A simulated grating of 16 µm pitch and 100 nm height, scanned at"
-        f" {scan.line_rate:g} Hz with {scan.lines} lines. Each height is drawn at the desired"
-        " position."
-    )
+    how = f"at {scan.line_rate:g} Hz with {scan.lines} lines"
     wrong = (
         f"The image of a grating is wrong by {without} nm rms without compensation, and by"
         f" {compensated} nm with it."
@@ -246,7 +242,7 @@ def demo_report(
     return ReportPage(
         title="A piezoscanner without and with compensation",
         answer=[_improvement(tables[0]), wrong],
-        picture=image_picture("grating", images, caption),
+        picture=image_picture("grating", images, how),
         next_steps=list(commands),
         evidence=[
             Section(

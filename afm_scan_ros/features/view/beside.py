@@ -72,9 +72,9 @@ def beside_pipeline(
             yield Feed(handover, listener)
         except BaseException as error:
             why = str(error) or "interrupted"
-            handover.last(Message(kinds.ENDED, {"state": "failed", "reason": why}))
+            handover.last = Message(kinds.ENDED, {"state": "failed", "reason": why})
             raise
-        handover.last(Message(kinds.ENDED, {"state": "done", "reason": ""}))
+        handover.last = Message(kinds.ENDED, {"state": "done", "reason": ""})
 
 
 @contextmanager

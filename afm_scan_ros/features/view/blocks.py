@@ -3,7 +3,6 @@
 import numpy as np
 
 from afm_scan_ros.core.image_lines import frame_of, most_pixels, pixel_means
-from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import (
     ACHIEVED,
@@ -29,7 +28,8 @@ class ShownBlocks:
     is missing, errors are known again from where both streams are, or from the next line on.
     """
 
-    def __init__(self, info: ScanInfo, screen: Screen, pixels: int) -> None:
+    def __init__(self, screen: Screen, pixels: int) -> None:
+        info = screen.info
         self._screen, self._step = screen, monitor_step(info.sample_period)
         self._next = dict.fromkeys(COMPARED, 0)
         self._from, self._aligner = 0, Aligner(COMPARED)

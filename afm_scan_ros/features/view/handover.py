@@ -23,7 +23,7 @@ class Handover:
         self._news: deque[Message] = deque(maxlen=settings.queued_news)
         self._waiting, self._left_out = 0, 0
         self._over = False
-        self._last: Message | None = None
+        self.last: Message | None = None  # comes after all else
         self._changed = Condition()
         Thread(target=self._send, daemon=True).start()
 
@@ -43,10 +43,6 @@ class Handover:
             self._left_out += len(self._news) == self._news.maxlen
             self._news.append(message)
             self._changed.notify()
-
-    def last(self, message: Message) -> None:
-        """Hand over what is to come after all else."""
-        self._last = message
 
     def finish(self) -> None:
         """Send what waits, and then the end."""
@@ -72,7 +68,7 @@ class Handover:
         with self._changed:
             while not (self._news or self._blocks or self._left_out):
                 if self._over:
-                    message, self._last = self._last, None
+                    message, self.last = self.last, None
                     return message
                 self._changed.wait()
             if self._left_out:

@@ -10,7 +10,6 @@ from attrs import define, field
 
 from afm_scan_ros.bag.scan_info import decode_info
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import ACHIEVED, LineError, end
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.link import Link, Message
@@ -62,7 +61,7 @@ def show_link(link: Link, where: str, settings: ViewSettings, wanted: Callable[[
         for message in messages:
             if message.kind == kinds.SCAN:
                 info = decode_info(bytes.fromhex(message.fields["info"]))
-                shown = ShownPipeline(info, open_screen(info, where, settings), settings)
+                shown = ShownPipeline(open_screen(info, where, settings), settings.pixels)
             elif shown is not None:
                 shown.take(message)
         if not wanted():
@@ -91,22 +90,21 @@ def _batches(link: Link, interval: float) -> Iterator[list[Message]]:
 class ShownPipeline:
     """A scan in one process, as its messages tell of it."""
 
-    info: ScanInfo
     screen: Screen
-    _settings: ViewSettings
+    _pixels: int
     _blocks: ShownBlocks = field(init=False)
     _sample: int = field(default=0, init=False)
     _is_over: bool = field(default=False, init=False)
 
     def __attrs_post_init__(self) -> None:
-        self._blocks = ShownBlocks(self.info, self.screen, self._settings.pixels)
+        self._blocks = ShownBlocks(self.screen, self._pixels)
 
     def take(self, message: Message) -> None:
         """Show what a message tells."""
         fields = message.fields
         if message.kind == kinds.BLOCK:
             first = fields["first_sample"]
-            block = Trace(first, self.info.sample_period, *message.samples)
+            block = Trace(first, self.screen.info.sample_period, *message.samples)
             self._blocks.add(fields["name"], block)
             if fields["name"] == ACHIEVED:
                 self._sample = end(block)

@@ -31,7 +31,7 @@ def show_bag(
     if not names:
         raise InputError(f"{bag}: holds no {DESIRED}, {DRIVE} or {ACHIEVED} to show")
     screen = open_screen(recording.info, where, settings)
-    shown, due, sample = ShownBlocks(recording.info, screen, settings.pixels), 0.0, 0
+    shown, due, sample = ShownBlocks(screen, settings.pixels), 0.0, 0
     for run in recording.blocks(*names):
         for name, trace in zip(names, run, strict=True):
             shown.add(name, trace)

@@ -47,7 +47,8 @@ BLOCKS = [
 class Shown:
     """Keeps what a screen is to show."""
 
-    def __init__(self) -> None:
+    def __init__(self, info: ScanInfo) -> None:
+        self.info = info
         self.curves: dict[str, dict[int, tuple[float, float]]] = {}
         self.lines: dict[int, LineError] = {}
         self.images: dict[str, Array] = {}
@@ -64,8 +65,8 @@ class Shown:
 
 
 def shown(blocks: Sequence[tuple[str, Trace]], info: ScanInfo | None = None) -> Shown:
-    found = Shown()
-    taken = ShownBlocks(info or info_of_scan(SPEC, "one", 0), found, 64)  # type: ignore[arg-type]
+    found = Shown(info or info_of_scan(SPEC, "one", 0))
+    taken = ShownBlocks(found, 64)  # type: ignore[arg-type]
     for name, block in blocks:
         taken.add(name, block)
     return found

@@ -114,7 +114,7 @@ def test_the_last_word_comes_after_blocks_that_wait() -> None:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         handover = Handover(ours, SETTINGS)
-        handover.last(Message(kinds.ENDED))
+        handover.last = Message(kinds.ENDED)
         for number in range(ROOM // 2):
             handover.block(block(number))
         handover.finish()
