@@ -51,6 +51,11 @@ SCAN_FILE = (
     "It holds parameters of the trajectory generator under `/**/trajectory_generator:` and"
     " `ros__parameters:`."
 )
+MODEL_FILE = (
+    "`afm-scan identify` writes it. The arrays lie in an `.npz` file beside it. `content_sha256` is"
+    " a digest of all else in the file, by which one that was cut short or edited is refused;"
+    " delete that line where the edit is meant, or write the file without it."
+)
 SETTINGS_FILE = (
     "It describes a scanner that a driver moves. The section `options:` holds the driver's own"
     " keys. [Your own scanner](../tutorials/own_scanner.md) has an example."
@@ -261,7 +266,7 @@ def files_of_users() -> str:
         _parameters([*scan_spec_parameters(), *FLOW]),
         _example("scan.yaml"),
         "## Model file",
-        "`afm-scan identify` writes it. The arrays lie in an `.npz` file beside it.",
+        MODEL_FILE,
         *_records(model_file._File),  # noqa: SLF001 - the file's own description
         "## Plant file",
         PLANT_FILE,

@@ -1,7 +1,8 @@
 """The model file: the model of a scanner in YAML with its arrays in an .npz beside it.
 
 It holds one axis or both.
-The YAML states a digest of the arrays, so that it is never read with those of another model.
+The YAML states a digest of the arrays, so that it is never read with those of another model, and
+one of all else in it, so that no part of it passes for the whole.
 Polynomials of the vibration stand in V/V, as a sensor's output is measured; the file states the
 ``sensor_sensitivity_m_per_v`` by which they become m/V. Effects that were added are listed:
 

@@ -6,7 +6,6 @@ the model file that states it is there. Then they take the place of those before
 
 import hashlib
 import json
-import logging
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -22,25 +21,27 @@ from afm_scan_ros.files import yaml
 from afm_scan_ros.files.arrays import Archive, sha256_of
 from afm_scan_ros.files.paths import flush, writing
 
-LOG = logging.getLogger(__name__)
 SEAL = "content_sha256"
 """Key of the digest of all other keys and values of the model file."""
 
 
 def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a model file's content with its digest, which shows whether it is edited later."""
+    """Return a model file's content with its digest, which shows whether it is whole later."""
     return {SEAL: _digest(content), **content}
 
 
 def load_sealed(path: Path) -> dict[str, Any]:
-    """Content of a model file without its digest; logs a warning where that is of another one."""
+    """Content of a model file without its digest; files of others and of long ago have none.
+
+    Raises InputError where the digest is of other content: a file that was cut short may still be
+    YAML. The digest comes first in a file, so that no cut takes it alone.
+    """
     content = yaml.load(path)
     stated = content.pop(SEAL, None)
     if stated not in (None, _digest(content)):
-        LOG.warning(
-            "%s was edited after it was written: see that it is whole, and delete its line %s",
-            path,
-            SEAL,
+        raise InputError(
+            f"{path}: was cut short or edited after it was written: bring the whole file back, or"
+            f" delete its line {SEAL} where the edit is meant"
         )
     return content
 

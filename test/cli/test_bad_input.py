@@ -1,6 +1,7 @@
 """Bad input of each kind: one line that names it, status 2, and never a traceback."""
 
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
+from afm_scan_ros.files.model_pair import SEAL
 
 CONFIG = share_directory() / "config"
 ROOT = Path(__file__).parents[2]
@@ -73,13 +75,21 @@ def test_a_wrong_file_of_a_scan(
     refused: Refused, config: Path, name: str, old: str, new: str, expected: str
 ) -> None:
     path = config / name
-    text = path.read_text("utf-8")
+    text = re.sub(f"{SEAL}: .*\n", "", path.read_text("utf-8"))
     assert old in text
     path.write_text(text.replace(old, new, 1), "utf-8")
     message = refused(*scan(config))
     assert str(config) in message
     assert expected in message
     assert not (config / "bag").exists()
+
+
+def test_a_model_that_was_cut_short(refused: Refused, config: Path) -> None:
+    whole, _, _ = (config / "model.yaml").read_text("utf-8").rpartition("  known_elsewhere:")
+    (config / "model.yaml").write_text(whole, "utf-8")
+    message = refused(*scan(config))
+    assert f"{config / 'model.yaml'}: was cut short or edited" in message
+    assert "bring the whole file back" in message
 
 
 @pytest.mark.parametrize("name", ["scan.yaml", "model.yaml", "model.npz", "plant.yaml"])

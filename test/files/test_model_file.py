@@ -27,6 +27,7 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+from afm_scan_ros.files.model_pair import SEAL, load_sealed
 
 
 def surface(slope: float) -> EverettSurface:
@@ -110,7 +111,7 @@ def test_a_duhem_operator_that_is_none_is_refused(
     path = tmp_path / "duhem.yaml"
     hysteresis = HysteresisModel(slopes(0.5), surface(2.0))
     save_model(path, evolve(MODEL, x=evolve(MODEL.x, hysteresis=hysteresis)), "a model")
-    content = yaml.load(path)
+    content = load_sealed(path)
     content["x"]["hysteresis"]["duhem"].update(change)
     yaml.save(path, content, "a model")
     with pytest.raises(InputError, match=message):
@@ -118,7 +119,7 @@ def test_a_duhem_operator_that_is_none_is_refused(
 
 
 def test_a_hysteresis_with_no_or_two_operators_is_refused(saved: Path) -> None:
-    content = yaml.load(saved)
+    content = load_sealed(saved)
     del content["x"]["hysteresis"]["forward"]
     yaml.save(saved, content, "a model")
     with pytest.raises(InputError, match=r"x: hysteresis: give one operator"):
@@ -174,7 +175,7 @@ def test_how_effects_are_known_comes_back_and_leaves_the_hash_alone(tmp_path: Pa
 
 
 def test_a_file_that_does_not_say_how_effects_are_known_has_identified_all(saved: Path) -> None:
-    content = yaml.load(saved)
+    content = load_sealed(saved)
     for axis in ("x", "y"):
         del content[axis]["effects"]
     yaml.save(saved, content, "a model")
@@ -226,8 +227,10 @@ def test_what_is_no_model_discrepancy_is_refused(
 
 
 def replace(old: str, new: str) -> Callable[[Path], None]:
+    """Edit the file, and delete its digest."""
+
     def change(path: Path) -> None:
-        text = path.read_text(encoding="utf-8")
+        text = re.sub(f"{SEAL}: .*\n", "", path.read_text(encoding="utf-8"))
         assert old in text
         path.write_text(text.replace(old, new, 1), encoding="utf-8")
 

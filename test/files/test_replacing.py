@@ -1,6 +1,7 @@
 """Whoever is killed while a file is written leaves the old one or the new one."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -12,8 +13,10 @@ import pytest
 from attrs import evolve
 
 import afm_scan_ros as afm
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.model_pair import SEAL
 from afm_scan_ros.files.paths import replacing, write_text
 
 CONFIG = share_directory() / "config"
@@ -86,20 +89,18 @@ model.save(sys.argv[1])
     assert hash_of(path) == hash_of(other)
 
 
-def test_an_edited_model_is_read_with_a_warning(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_edit_of_a_model_is_meant_where_its_digest_is_deleted(tmp_path: Path) -> None:
     path = tmp_path / "model.yaml"
     afm.load_model().save(path)
-    afm.load_model(path)
     path.write_text(f"# a remark\n{path.read_text()}")
-    afm.load_model(path)
-    assert not caplog.messages
+    before = hash_of(path)
     content = path.read_text()
     place = content.index("gains: [") + len("gains: [")
     path.write_text(f"{content[:place]}0.001{content[content.index(',', place) :]}")
-    afm.load_model(path)
-    assert f"{path} was edited after it was written" in caplog.text
+    with pytest.raises(InputError, match=f"edited after it was written.*delete its line {SEAL}"):
+        load_model(path)
+    path.write_text(re.sub(f"{SEAL}: .*\n", "", path.read_text()))
+    assert hash_of(path) != before
 
 
 def _fail_within(beside: Path) -> None:

@@ -22,6 +22,7 @@ from afm_scan_ros.core.model import (
 from afm_scan_ros.core.spread import Spread, Variant
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
+from afm_scan_ros.files.model_pair import load_sealed
 
 PERIOD = 1e-3
 
@@ -83,7 +84,7 @@ def test_how_uncertain_a_model_is_does_not_tell_it_from_another() -> None:
 def test_directions_of_another_model_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "model.yaml"
     save_model(path, model(duhem=False), "a model")
-    content = yaml.load(path)
+    content = load_sealed(path)
     content["y"]["spread"]["directions"] = "y_direct"
     yaml.save(path, content, "a model")
     with pytest.raises(InputError, match=r"y: spread: 'y_direct' holds 9 numbers a direction"):

@@ -23,8 +23,10 @@ from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model, model_hash
+from afm_scan_ros.files.model_pair import load_sealed
 from afm_scan_ros.files.plant_file import PARAMETERS, load_plant, load_scan
 from afm_scan_ros.files.records import to_mapping
+from afm_scan_ros.files.yaml import save
 from afm_scan_ros.nodes.flow import FLOW
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.scanner import Piezoscanner
@@ -114,9 +116,11 @@ def _refuse_not_finite(trace: Trace) -> None:
 
 
 def _copied(name: str, folder: Path) -> Path:
+    """Copy a file, and a model without its digest, which would refuse each mistake unread."""
     config = share_directory() / "config"
-    for each in {name, "model.yaml", "model.npz"}:
+    for each in {name, "model.npz"}:
         shutil.copy(config / each, folder)
+    save(folder / "model.yaml", load_sealed(config / "model.yaml"), "")
     return folder / name
 
 
