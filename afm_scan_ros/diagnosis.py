@@ -204,7 +204,8 @@ def diagnose(
         the model's error on motion of their kind to the model. Of coupled axes they are best what
         the model was identified from; without, the model's stated error stands for its amplitudes.
     progress
-        Is called with the effect that is being tried.
+        Is called with the effects that are being fitted: text that also has how many sets are
+        ``done`` of a ``total``, to which more may come. ``timed(print)`` shows it with the time.
     longest
         Length of a proposed experiment, at most, s.
     parallel

@@ -71,7 +71,8 @@ def identify(
         None needs a kind. Those of the kind "validation" fit nothing: the model's error is measured
         on them, and ``diagnose`` needs that error.
     progress
-        Is called with what is being fitted.
+        Is called with what is being fitted: text that also has how many axes are ``done`` of a
+        ``total``. ``timed(print)`` shows it with the time.
     effects
         Of coupled axes, what acts in their feedback, of "amplitude_softening" and "maxwell_slip":
         identified with the vibration, best from records of several amplitudes.

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
-from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing, working
+from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.cli.scanner import SIM
 from afm_scan_ros.core.closed_loop import Round, validation_specs
 from afm_scan_ros.core.closed_loop import close_loop as rounds_of
@@ -83,8 +84,9 @@ def close_loop(
             say(f"round {len(done)}: {each.diagnosis.verdict.replace('_', ' ')}")
             show(round_result(each))
             of = provenance(_diagnosed(each, session.sources))
-            described = report_residual(each.diagnosis)
-            write_diagnosis(out / f"round_{len(done)}", described, HEADING, of, figures)
+            with working(f"reporting round {len(done)}", at_once=False):
+                described = report_residual(each.diagnosis)
+                write_diagnosis(out / f"round_{len(done)}", described, HEADING, of, figures)
     except (InputError, ScanError) as error:
         if done:
             _conclude(out, done, provenance(session.sources), figures, str(error))
@@ -127,7 +129,8 @@ def _conclude(
     made = {"provenance": plain(of)}
     save_diagnosis(out / "diagnosis.json", {**diagnosis_of(done), **made})
     save_diagnosis(out / "closed_loop.json", {**closed_loop_document(done, failure), **made})
-    close_loop_report(done, of, failure).write(out / "report.html", figures)
+    with working("writing the report", at_once=False):
+        close_loop_report(done, of, failure).write(out / "report.html", figures)
     kept = [each.diagnosis.model for each in done if each.kept]
     model, head = kept[-1] if kept else done[0].model, f"{HEADING}\n{heading_lines(of)}"
     save_model(out / "model.extended.yaml", model, head)

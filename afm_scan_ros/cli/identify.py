@@ -14,15 +14,15 @@ from afm_scan_ros.cli.options import (
     TableOptions,
     record_options,
     refuse_existing,
-    working,
 )
+from afm_scan_ros.cli.progress import working
+from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
 from afm_scan_ros.core.identification.fitted_axis import FittedAxis
 from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
-from afm_scan_ros.model import Model
 from afm_scan_ros.report.effect_status_text import status_text, unknown_effects
 from afm_scan_ros.report.fit_page import fit_report
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
@@ -91,30 +91,34 @@ def identify(
         raise click.UsageError("give at least one RECORD, as a bag of 'afm-scan calibrate'")
     with working("identifying", at_once=False) as progress:
         model = api.identify(given, progress, effects=effects, states=states, linear=linear)
+        model.save(out, HEADING)
+        if not model.is_coupled:
+            progress("writing the report")
+            _report(model.fit, out, figures)
     if model.is_coupled:
-        _write_coupled(model, out)
+        _show_coupled(model.coupled)
+        say(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
         return
-    found = model.fit
-    model.save(out, HEADING)
-    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
-    write_text(out.with_suffix(".fit.json"), summary + "\n")
-    fit_report(found, out).write(out.with_suffix(".fit.html"), figures)
-    _show(found)
+    _show(model.fit)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     say(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
 
 
-def _write_coupled(model: Model, out: Path) -> None:
-    """Show the errors of a model of coupled axes on held-out records, and write it."""
-    found = model.coupled
+def _report(found: Identification, out: Path, figures: str | None) -> None:
+    """Write the fit report beside the model file."""
+    summary = json.dumps(fit_summary(found), indent=2, allow_nan=False)
+    write_text(out.with_suffix(".fit.json"), summary + "\n")
+    fit_report(found, out).write(out.with_suffix(".fit.html"), figures)
+
+
+def _show_coupled(found: CoupledScanner) -> None:
+    """Show the errors of a model of coupled axes on held-out records."""
     say(f"{', '.join(found.axes)}: coupled vibration, {found.linear.order} states")
     for error in found.errors:
         say(
             f"   driven by {error.drive_rms:.3g} V rms, held-out record:"
             f" {1e9 * error.error_rms:.1f} nm rms, {error.relative:.2%} of the displacement's"
         )
-    model.save(out, HEADING)
-    say(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
 
 
 def _show(found: Identification) -> None:

@@ -17,6 +17,7 @@ from afm_scan_ros.cli.options import (
     table_options,
     warn,
 )
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
 from afm_scan_ros.core.identification.records.recording import kind_of, problems
@@ -78,7 +79,8 @@ def import_csv(
             f"--record {record}: this is the name of a scan pattern: give another name"
         )
     rows = RowRange(tables.skip_rows, start_row, stop_row)
-    found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
+    with working("reading the table", at_once=False):
+        found = read_table_record(files, tables.parsed, rows, tables.sample_rate)
     axes = _axes(files[0], found)
     streams = _streams(found)
     drive, achieved = (streams.get(STREAM[quantity]) for quantity in ("drive", "achieved"))
@@ -97,7 +99,8 @@ def import_csv(
         total_samples=found.samples,
         sampling_instant=sampling_instant,
     )
-    write_record(bag, info, streams)
+    with working("writing the bag", at_once=False):
+        write_record(bag, info, streams)
     say(f"{bag} holds {found.samples} samples of a record '{name}'.")
     for axis in (axis for axis in AXES if axis not in axes):
         say(f"Axis {axis} was not measured: it is filled with zeros.")
@@ -148,7 +151,8 @@ def invert(
     refuse_existing(out, other="file")
     scanner = load_model(model)
     rows = RowRange(tables.skip_rows)
-    found = read_table_record([desired], tables.parsed, rows, tables.sample_rate, USE_OF_PATH)
+    with working("reading the table", at_once=False):
+        found = read_table_record([desired], tables.parsed, rows, tables.sample_rate, USE_OF_PATH)
     warn(found.notes)
     path = found.signals.get("desired", {})
     if set(path) != set(scanner.axes):
@@ -159,8 +163,9 @@ def invert(
         )
     limits = None if limit is None else DriveLimits(limit, float("inf"))
     values = np.column_stack([path[axis] for axis in scanner.axes])
-    drive = scanner.invert(values, found.sample_period, limits=limits)
-    _write(out, scanner.axes, found.sample_period, drive)
+    with working("inverting", at_once=False):
+        drive = scanner.invert(values, found.sample_period, limits=limits)
+        _write(out, scanner.axes, found.sample_period, drive)
     extent = f"{drive.min():.4g} to {drive.max():.4g} V"
     say(f"{out} holds {len(drive)} samples of the drive, {extent}.")
 

@@ -11,8 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from afm_scan_ros.bag.typestore import Message
-from afm_scan_ros.cli.options import working
-from afm_scan_ros.cli.progress import ScanProgress, showing
+from afm_scan_ros.cli.progress import ScanProgress, showing, working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.nodes.peers import READY, RUNNING
 from afm_scan_ros.nodes.run import join

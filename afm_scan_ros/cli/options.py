@@ -1,33 +1,28 @@
-"""What commands share: types of options, records that they read, warnings, and progress."""
+"""What commands share: types of options, records that they read, and warnings."""
 
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from inspect import signature
 from pathlib import Path
-from time import monotonic
 from types import MappingProxyType
 from typing import Any
 
 import click
 from attrs import evolve, frozen
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from afm_scan_ros.bag.reader import TYPES
 from afm_scan_ros.bag.record import is_table, read_record
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.intersample import HELD, INTERSAMPLE
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import ProgressCallback, Step
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.columns import Column, parse_columns
 from afm_scan_ros.files.paths import refuse_unwritable
 from afm_scan_ros.files.units import A_NUMBER, METRES, SECONDS, VOLTS, in_ascii
-from afm_scan_ros.report.terminal import complain, say, showing_log, visible
+from afm_scan_ros.report.terminal import complain
 
 CONFIG = share_directory() / "config"
 Command = Callable[..., None]
@@ -138,62 +133,6 @@ def quantity(unit: str, *, above_zero: bool = False) -> Callable[[str], float]:
 def positive(unit: str) -> Callable[[str], float]:
     """Return the type of an option as ``quantity`` does; it must be above zero."""
     return quantity(unit, above_zero=True)
-
-
-EVERY = 20.0
-"""Least time between two lines of a log, s."""
-
-
-@contextmanager
-def working(title: str, *, at_once: bool = True) -> Iterator[ProgressCallback]:
-    """Show a title with the time elapsed; yield a function that shows the current step.
-
-    Log messages of the package are shown too. Outside a terminal the first line comes ``at_once``,
-    or after ``EVERY`` seconds, where the input may be refused soon.
-    """
-    with showing_log(), _progress_line(title, at_once=at_once) as report:
-        yield report
-
-
-@contextmanager
-def _progress_line(title: str, *, at_once: bool) -> Iterator[ProgressCallback]:
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield in_lines(title, at_once=at_once)
-        return
-    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
-        task, began = progress.add_task(visible(title)), monotonic()
-
-        def report(doing: str) -> None:
-            said = f"{title}: {doing}{_time_left(doing, monotonic() - began)}"
-            progress.update(task, description=visible(said))
-
-        yield report
-
-
-def _time_left(doing: str, elapsed: float) -> str:
-    """Say how long the rest takes, where the parts of what is done are counted."""
-    left = doing.left(elapsed) if isinstance(doing, Step) else None
-    return f", about {left:.0f} s left" if left and left >= 1.0 else ""
-
-
-def in_lines(
-    title: str, clock: Callable[[], float] = monotonic, *, at_once: bool = True
-) -> ProgressCallback:
-    """Return a function that writes the current step to stderr, at most every ``EVERY`` seconds."""
-    began = clock()
-    due = began if at_once else began + EVERY
-
-    def report(doing: str) -> None:
-        nonlocal due
-        now = clock()
-        if now >= due:
-            due = now + EVERY
-            left = _time_left(doing, now - began)
-            say(f"{title}: {doing} ({now - began:.0f} s{left})", err=True)
-
-    return report
 
 
 @frozen

@@ -21,8 +21,8 @@ from afm_scan_ros.cli.options import (
     refuse_existing,
     topic_option,
     warn,
-    working,
 )
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import plain
@@ -61,13 +61,15 @@ def analyze(
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
     if figures is not None and report is None:
         raise click.UsageError("--figures are written beside a report: give --report")
-    recording = read_scan(bag, topics)
-    if comparable(recording) and report is None and figure is None:
-        compared = compare(recording)
+    with working("analysing", at_once=False):
+        recording = read_scan(bag, topics)
+        alone = comparable(recording) and report is None and figure is None
+        found = compare(recording) if alone else analyse(recording)
+    if isinstance(found, Comparison):
         warn(recording.warnings)
-        _show_comparison(compared, json_file)
+        _show_comparison(found, json_file)
         return
-    analysis = analyse(recording)
+    analysis = found
     warn(analysis.warnings)
     show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
     if json_file is not None:

@@ -11,7 +11,8 @@ from attrs import evolve, field, frozen
 from click.core import ParameterSource
 
 from afm_scan_ros.bag.writer import write_record
-from afm_scan_ros.cli.options import CONFIG, FILE, positive, working
+from afm_scan_ros.cli.options import CONFIG, FILE, positive
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError

@@ -16,16 +16,20 @@ ProgressCallback: TypeAlias = Callable[[str], None]
 
 
 class Step(str):
-    """What a long computation is doing, when ``done`` of its ``total`` equal parts are over."""
+    """What a long computation is doing, when ``done`` of its ``total`` equal parts are over.
 
-    __slots__ = ("done", "total")
+    Where ``more`` parts may follow, which are not planned yet, the time left is a lower bound.
+    """
+
+    __slots__ = ("done", "more", "total")
     done: int
     total: int
+    more: bool
 
-    def __new__(cls, text: str, done: int, total: int) -> Self:
+    def __new__(cls, text: str, done: int, total: int, *, more: bool = False) -> Self:
         """Return a step with its text."""
         step = super().__new__(cls, text)
-        step.done, step.total = done, total
+        step.done, step.total, step.more = done, total, more
         return step
 
     def left(self, elapsed: float) -> float | None:

@@ -143,7 +143,7 @@ def test_the_report_begins_with_the_answer(run: Run) -> None:
 
 
 def test_what_is_tried_is_not_reported_as_found(run: Run) -> None:
-    assert re.search(r"diagnosing: [xy]: fitting \w+ \(", run.result.output)
+    assert re.search(r"diagnosing: [xy]: trying \w+ \(", run.result.output)
 
 
 def test_the_report_says_what_was_added_and_what_else_was_tried(run: Run) -> None:

@@ -1,9 +1,28 @@
 """What a long computation is at is reported outside a terminal too, and does not flood a log."""
 
+import time
+
 import pytest
 
-from afm_scan_ros.cli.options import EVERY, in_lines, working
+from afm_scan_ros.cli import progress
+from afm_scan_ros.cli.progress import EVERY, Lines, working
+from afm_scan_ros.core.progress import Stopwatch
 from afm_scan_ros.core.types import Step
+
+
+class Clock:
+    """A clock that is set."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
 
 
 def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:
@@ -15,36 +34,48 @@ def test_a_log_hears_when_it_begins(capsys: pytest.CaptureFixture[str]) -> None:
     assert (message.err, message.out) == ("diagnosing: x: delay (0 s)\n", "")
 
 
-def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_hears_now_and_then(capsys: pytest.CaptureFixture[str], clock: Clock) -> None:
     """A step a second for ten minutes, as in a long record."""
-    seconds = iter(range(601))
-    report = in_lines("diagnosing", lambda: float(next(seconds)))
+    report = Lines("diagnosing", watch=Stopwatch(clock))
     for step in range(600):
+        clock.now = step
         report(f"step {step}")
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 600 / EVERY
-    assert lines[1] == "diagnosing: step 20 (21 s)"
+    assert lines[1] == "diagnosing: step 20 (20 s)"
 
 
-def test_a_log_hears_nothing_of_what_is_over_soon(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_hears_nothing_of_what_is_over_soon(
+    capsys: pytest.CaptureFixture[str], clock: Clock
+) -> None:
     """A step a second for a minute, where the first line is not to come at once."""
-    seconds = iter(range(61))
-    report = in_lines("diagnosing", lambda: float(next(seconds)), at_once=False)
-    for step in range(int(EVERY) - 1):
+    report = Lines("diagnosing", EVERY, Stopwatch(clock))
+    for step in range(60):
+        clock.now = step
         report(f"step {step}")
-    assert capsys.readouterr().err == ""
-    for step in range(int(EVERY) - 1, 60):
-        report(f"step {step}")
-    assert capsys.readouterr().err.splitlines()[0] == "diagnosing: step 19 (20 s)"
+        assert (capsys.readouterr().err != "") == (step in {20, 40})
+
+
+def test_a_log_hears_of_a_step_that_lasts(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "EVERY", 0.05)
+    with working("identifying", at_once=False) as report:
+        report("x: looking for modes")
+        lines: list[str] = []
+        while len(lines) < 2:
+            time.sleep(0.01)
+            lines += capsys.readouterr().err.splitlines()
+    assert set(lines) == {"identifying: x: looking for modes (0 s)"}
 
 
 def test_a_log_hears_how_long_what_is_counted_still_takes(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], clock: Clock
 ) -> None:
     """A part takes ten seconds, whatever the number of parts."""
-    moments = iter([0.0, 0.0, 40.0, 70.0])
-    report = in_lines("surveying", lambda: next(moments))
+    report = Lines("surveying", watch=Stopwatch(clock))
     for done in (0, 4, 7):
+        clock.now = 10.0 * done
         report(Step(f"bag {done}", done, 10))
     assert capsys.readouterr().err.splitlines() == [
         "surveying: bag 0 (0 s)",
@@ -54,12 +85,15 @@ def test_a_log_hears_how_long_what_is_counted_still_takes(
 
 
 def test_a_terminal_sees_how_long_what_is_counted_still_takes(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, clock: Clock
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "200")
-    moments = iter([0.0, 5.0])
-    monkeypatch.setattr("afm_scan_ros.cli.options.monotonic", lambda: next(moments))
+    monkeypatch.setattr(progress, "Stopwatch", lambda: Stopwatch(clock))
     with working("surveying") as report:
+        clock.now = 5.0
         report(Step("one bag", 1, 4))
-    assert "surveying: one bag, about 15 s left" in capfd.readouterr().err
+        clock.now = 7.0
+    shown = capfd.readouterr().err
+    assert "surveying: one bag" in shown
+    assert "(7 s, about 13 s left)" in shown

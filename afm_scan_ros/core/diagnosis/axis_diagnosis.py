@@ -29,9 +29,10 @@ from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
+from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.types import Array, ProgressCallback, floats
+from afm_scan_ros.core.types import Array, floats
 
 ALONG = TYPICAL_SHARE / FREEDOM
 """Power of a healthy residual along one influence, in detection limits squared."""
@@ -223,7 +224,7 @@ def diagnose_axis(
     axis: str,
     model: ScannerModel,
     observations: Sequence[Record],
-    progress: ProgressCallback,
+    tally: Tally,
     *,
     structure: bool = False,
 ) -> AxisDiagnosis:
@@ -238,7 +239,7 @@ def diagnose_axis(
     given = [evidence_of(axis, model, each, i) for i, each in enumerate(observations)]
     evidence = tuple(given) if structure else with_free_directions(given, chain)
     nuisance = (refit_of(model.axis(axis)),) if structure else ()
-    search = partial(_search, chain=chain, progress=progress, nuisance=nuisance)
+    search = partial(_search, chain=chain, tally=tally, nuisance=nuisance)
     fresh = tuple(each.from_depolarised(chain) for each in evidence)
     if all(one is other for one, other in zip(evidence, fresh, strict=True)):
         return _diagnosed(axis, search(evidence))
@@ -248,13 +249,11 @@ def diagnose_axis(
 def _search(
     evidence: tuple[Evidence, ...],
     chain: Chain,
-    progress: ProgressCallback,
+    tally: Tally,
     nuisance: tuple[EffectForm, ...],
 ) -> ModelSearch:
     fitter = CandidateFitter(evidence, chain, nuisance)
-    return ModelSearch(
-        fitter, lambda c: features_of(fitter.decimated_evidence, evidence, c), progress
-    )
+    return ModelSearch(fitter, lambda c: features_of(fitter.decimated_evidence, evidence, c), tally)
 
 
 def _likelier(searches: Sequence[ModelSearch]) -> ModelSearch:

@@ -44,6 +44,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import with_overshoot
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
+from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import synchronised
 from afm_scan_ros.core.types import ProgressCallback
@@ -128,7 +129,8 @@ def diagnose(
     """Diagnose every axis that the model and all records have, in threads if ``parallel``.
 
     Records of the ``healthy`` scanner tell the model's error. ``progress`` is called with the axis
-    and the candidate that is being fitted. A proposed experiment lasts at most ``longest`` s.
+    and the effects that are being fitted, with their number on all axes. A proposed experiment
+    lasts at most ``longest`` s.
     What the ``structure`` of the model lacks is traced where asked for: see structure.py.
     Raises InputError where no record or no common axis is given, or where the model states no model
     discrepancy.
@@ -142,12 +144,14 @@ def diagnose(
     believed = counted_exact(model) if structure else model
     for observed in observations:
         believed = with_overshoot(believed, observed)
+    tally = Tally(progress)
     by_axis = (in_parallel if parallel else _in_turn)(
         lambda name: diagnose_axis(
-            name, believed, observations, _on_axis(name, progress), structure=structure
+            name, believed, observations, tally.named(f"{name}: "), structure=structure
         ),
         _axes_of_all(model, observations),
     )
+    progress("proposing what to record next")
     verdict = max((diagnosed.verdict for diagnosed in by_axis.values()), key=SEVERITY.index)
     return ScannerDiagnosis(
         observations=tuple(observations),
@@ -181,10 +185,6 @@ def _axes_of_all(model: ScannerModel, observations: Sequence[Record]) -> list[st
             " give records of an axis that the model holds"
         )
     return axes
-
-
-def _on_axis(axis: str, progress: ProgressCallback) -> ProgressCallback:
-    return lambda candidate: progress(f"{axis}: fitting {candidate}")
 
 
 def _extended(axis: AxisModel, diagnosed: AxisDiagnosis) -> AxisModel:

@@ -14,12 +14,14 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.candidates import (
     CANDIDATES,
     LOG_ODDS,
+    Candidate,
     CandidateFitter,
     FittedCandidates,
 )
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.core.progress import Tally
+from afm_scan_ros.core.types import Array
 
 NEARLY = 0.01
 """Probability, relative to the most probable set, from which on a set is considered beside it."""
@@ -168,7 +170,7 @@ class Selection:
 
 
 class ModelSearch:
-    """Searches sets of effects; ``progress`` is called with the name of each candidate.
+    """Searches sets of effects, whose fits are counted by a ``tally``.
 
     ``features`` gives the features of the residual that a chain leaves.
     """
@@ -177,9 +179,9 @@ class ModelSearch:
         self,
         fitter: CandidateFitter,
         features: Callable[[Chain], ResidualFeatures],
-        progress: ProgressCallback,
+        tally: Tally,
     ) -> None:
-        self.fitter, self._features, self._progress = fitter, features, progress
+        self.fitter, self._features, self._tally = fitter, features, tally
         self._without = fitter.without
         self._outside = fitter.likelihood.outside()
         self._trials: list[FittedCandidates] = []
@@ -195,6 +197,7 @@ class ModelSearch:
     def grow(self) -> None:
         """Fit sets of one effect more."""
         parents: list[FittedCandidates | None] = [*self._parents()] if self._size else [None]
+        self._tally.plan(sum(len(_addable(parent)) + FITTED for parent in parents))
         found = [trial for parent in parents for trial in self._beside(parent)]
         found += [trial for best in _best(found, 2) for trial in self._other_forms(best)]
         self._trials += found
@@ -232,19 +235,21 @@ class ModelSearch:
         """Fit the most promising candidates beside a set."""
         chain = (parent or self._without).extended(self.fitter.chain)
         features, begun = self._features(chain), []
-        present = parent.names if parent else ()
-        for candidate in CANDIDATES:
-            if candidate.effect.name in present and not candidate.form.repeatable:
-                continue
-            self._progress(candidate.effect.name)
+        for candidate in _addable(parent):
+            self._tally.begin(f"trying {candidate.effect.name}")
             begun.append(self.fitter.begin(parent, candidate, features))
         promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
+        self._tally.plan(len(promising) - FITTED)
         for beginning in promising:
+            self._tally.begin(_fitting(beginning.candidates))
             if trial := self.fitter.fit(beginning):
                 yield trial
 
     def _other_forms(self, trial: FittedCandidates) -> Iterator[FittedCandidates]:
         """Fit the other forms of each effect, and the other orders of the last one."""
+        others = sum(len(candidate.effect.forms) for candidate in trial.candidates) - 1
+        self._tally.plan(others)
+        self._tally.begin(f"{_fitting(trial.candidates)} in other forms", others)
         yield from self.fitter.reordered(trial)
         for place, candidate in enumerate(trial.candidates):
             features = self._features(trial.without(self.fitter.chain, place))
@@ -253,6 +258,16 @@ class ModelSearch:
                     other = self.fitter.with_form(trial, place, form, features)
                     if other:
                         yield other
+
+
+def _addable(parent: FittedCandidates | None) -> list[Candidate]:
+    """Candidates that are tried beside a set."""
+    present = parent.names if parent else ()
+    return [c for c in CANDIDATES if c.effect.name not in present or c.form.repeatable]
+
+
+def _fitting(candidates: Iterable[Candidate]) -> str:
+    return f"fitting {' and '.join(each.effect.name for each in candidates)}"
 
 
 def _best(trials: list[FittedCandidates], count: int) -> Iterator[FittedCandidates]:

@@ -83,6 +83,7 @@ def fit_axis(
         return _of_linear(fit, progress)
     progress("fitting the hysteresis by plays")
     fit = better(_of_plays(fit, progress), progress)
+    progress("fitting all effects together")
     while True:
         settle(fit, settings.most_steps, searching=True)
         if fit.find_tones():
@@ -128,6 +129,7 @@ def _of_plays(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
         fit.find_tones()
     if fit.layout.unknown_starts:
         fit = with_rest(fit, progress, by_plays)
+    progress("fitting the map behind the hysteresis")
     settle(fit, settings.stage_steps)
     fit.find_tones()
     settle(fit, settings.stage_steps, searching=True)

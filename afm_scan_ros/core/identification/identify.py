@@ -10,7 +10,7 @@ from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_ax
 from afm_scan_ros.core.identification.records.recording import checked
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import AXES, ProgressCallback
+from afm_scan_ros.core.types import AXES, ProgressCallback, Step
 
 
 @frozen(eq=False)
@@ -37,18 +37,20 @@ def identify_records(
     model's error. What the others do not identify is unknown in the model. Raises InputError where
     records are not of one scanner or show nothing, ScanError where a fit diverges.
     """
-    axes = {}
+    axes: dict[str, FittedAxis] = {}
     given = [checked(record) for record in records]
-    for axis in AXES:
+    present = [axis for axis in AXES if any(axis in record.axes for record in given)]
+    for axis in present:
         of_axis = [record.axis(axis) for record in given if axis in record.axes]
-        if of_axis:
-            with _naming(axis):
-                axes[axis] = identify_axis(of_axis, axis, _named(progress, axis), linear=linear)
+        counted = _counted(progress, axis, len(axes), len(present))
+        with _naming(axis):
+            axes[axis] = identify_axis(of_axis, axis, counted, linear=linear)
     return Identification(axes)
 
 
-def _named(progress: ProgressCallback, axis: str) -> ProgressCallback:
-    return lambda message: progress(f"{axis}: {message}")
+def _counted(progress: ProgressCallback, axis: str, done: int, total: int) -> ProgressCallback:
+    """Name the axis in each message, and count the axes that are over."""
+    return lambda message: progress(Step(f"{axis}: {message}", done, total))
 
 
 @contextmanager

@@ -7,7 +7,8 @@ import click
 import numpy as np
 
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
-from afm_scan_ros.cli.options import NEW_FILE, RECORD, refuse_existing, topic_option, warn, working
+from afm_scan_ros.cli.options import NEW_FILE, RECORD, refuse_existing, topic_option, warn
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES, Array

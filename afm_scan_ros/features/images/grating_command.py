@@ -6,15 +6,8 @@ from pathlib import Path
 import click
 from attrs import evolve
 
-from afm_scan_ros.cli.options import (
-    FIGURES,
-    FILE,
-    FOLDER,
-    NEW_FILE,
-    positive,
-    refuse_existing,
-    working,
-)
+from afm_scan_ros.cli.options import FIGURES, FILE, FOLDER, NEW_FILE, positive, refuse_existing
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import BaseEffects
 from afm_scan_ros.features.images.files.channels import image_channels, words_of
@@ -125,21 +118,23 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     held = f"x with what is identified above, and y as a gain{coupled}"
     say(f"{out} holds the model: {held}.")
     if report is not None:
-        deviation = deviation_picture(used, found.positions)
         options = {
             "--volts-per-um": scale and f"{scale:g}",
             "--accuracy": f"{accuracy:g}",
             "--line-time": line_time and f"{line_time:g}s",
         }
         again = correction_of_another(images, pitch, out, options)
-        pages = grating_report(table, used, found.corrected, deviation, known, [*advice, again])
-        pages.write(report, figures)
+        with working("writing the report", at_once=False):
+            deviation = deviation_picture(used, found.positions)
+            pages = grating_report(table, used, found.corrected, deviation, known, [*advice, again])
+            pages.write(report, figures)
     if folder is not None:
         table.save(folder)
-        for image, better in zip(used, found.corrected, strict=True):
-            _write_corrected(targets[given.index(image)], image, better)
-        for target, image in zip(targets[len(given) :], others, strict=True):
-            _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
+        with working("writing the images", at_once=False):
+            for image, better in zip(used, found.corrected, strict=True):
+                _write_corrected(targets[given.index(image)], image, better)
+            for target, image in zip(targets[len(given) :], others, strict=True):
+                _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))
         say(f"{folder} holds the corrected images, their pictures and the table.")
 
 

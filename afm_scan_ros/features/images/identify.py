@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from afm_scan_ros.core.arguments import IMAGE, IMAGES, MODEL, all_of_type, of_type, positive
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback, Step
 from afm_scan_ros.features.images.grating.models import Positions, model_of
 from afm_scan_ros.features.images.grating.registered_image import (
     ImageQuantity,
@@ -69,7 +69,8 @@ def identify_from_images(
         Drive over commanded position, of both axes or of x and y. By default a drive of 1 V stands
         for a commanded position of 1 µm.
     progress
-        Is called with what is being done.
+        Is called with what is being done: text that also has how many images are ``done`` of a
+        ``total`` while their cells are found. ``timed(print)`` shows it with the time.
     accuracy
         Relative error of the distance of a pitch, rms over the image, that one image must reach
         with 95 % certainty. The other images may err by twice as much, in y only those as large.
@@ -136,8 +137,9 @@ def _registered(
     """Register images; return the errors of those that are refused."""
     seen: list[RegisteredImage] = []
     errors: list[InputError | ScanError] = []
-    for image in images:
-        report(f"finding the cells of the grating in {image.name}")
+    for number, image in enumerate(images):
+        doing = f"finding the cells of the grating in {image.name}"
+        report(Step(doing, number, len(images), more=True))
         try:
             seen.append(register_image(image, pitch))
         except InputError as error:

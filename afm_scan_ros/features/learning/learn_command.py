@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 
 from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession, driven_options
-from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing, working
+from afm_scan_ros.cli.options import CONFIG, FIGURES, FILE, FOLDER, refuse_existing
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.cli.scan import drive_limits_of
 from afm_scan_ros.core.diagnosis.diagnosis import diagnose
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -146,4 +147,5 @@ def _write(
     """Write what was learned; ``failure`` is what ended it, if any."""
     document = {**learning_document(done, taught), "failure": failure, "provenance": plain(of)}
     save_diagnosis(out / "learning.json", document)
-    learning_report(done, taught, of, commands, failure).write(out / "report.html", figures)
+    with working("writing the report", at_once=False):
+        learning_report(done, taught, of, commands, failure).write(out / "report.html", figures)

@@ -12,7 +12,8 @@ from re import Pattern
 import click
 from attrs import evolve, frozen
 
-from afm_scan_ros.cli.options import FIGURES, FOLDER, RECORD, grouped, positive, working
+from afm_scan_ros.cli.options import FIGURES, FOLDER, RECORD, grouped, positive
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Step
 from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag

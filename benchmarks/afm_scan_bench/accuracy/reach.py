@@ -10,7 +10,7 @@ from afm_scan_bench.curve import TableCurve
 from afm_scan_bench.mechanisms.product_sizes import SIZES, sized
 from afm_scan_bench.scans import default_model, default_plant, spec_at
 from afm_scan_bench.session import InProcessSession
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.closed_loop import FIRST
 from afm_scan_ros.core.model import Added
 from afm_scan_ros.report.table import Row, Table

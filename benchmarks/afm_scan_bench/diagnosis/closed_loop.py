@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 from afm_scan_bench.scans import SEED, default_model
 from afm_scan_ros.cli.driving import DrivenScanner, RecordedSession
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.closed_loop import Round, close_loop, validation_specs
 from afm_scan_ros.core.comparison import rms_of
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose

@@ -25,8 +25,8 @@ from afm_scan_bench.faults.injection.hosts import (
     on_host,
     two_hosts,
 )
-from afm_scan_ros.cli.options import working
 from afm_scan_ros.cli.processes import NodeCommand
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.drivers import settings_file
 from afm_scan_ros.files import share_directory, yaml

@@ -13,7 +13,7 @@ from afm_scan_bench.faults.injection.drive import DriveOutcome
 from afm_scan_bench.faults.injection.faulty_scanner import FAULTS
 from afm_scan_bench.faults.injection.trial import numbered
 from afm_scan_bench.faults.machine import load
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.report.table import Row, Table
 

@@ -22,7 +22,7 @@ from afm_scan_bench.faults.machine import load
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.scan_info import DISPLACEMENT, decode_block
 from afm_scan_ros.cli.execution import how_scans_run
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.streams import end
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.features.view.settings import ViewSettings

@@ -10,7 +10,7 @@ from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import PATIENCE, Heard, Trial
 from afm_scan_bench.faults.machine import load
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import BLOCKS, TRUE

@@ -10,7 +10,7 @@ from attrs import define, field, frozen
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import PATIENT, Trial
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import BLOCKS

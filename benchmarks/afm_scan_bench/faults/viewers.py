@@ -18,7 +18,7 @@ from afm_scan_bench.faults.injection.bag import Undisturbed
 from afm_scan_bench.faults.injection.processes import NODES
 from afm_scan_bench.faults.injection.trial import Heard, Trial, numbered, undisturbed
 from afm_scan_bench.faults.machine import load
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.report.table import Row, Table
 

@@ -7,7 +7,7 @@ from attrs import evolve, frozen
 
 from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.scans import default_plant, spec_at, tracking
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.comparison import RELEVANT_CHANGE, rms_of
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_spec import ScanSpec

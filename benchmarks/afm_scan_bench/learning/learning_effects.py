@@ -11,7 +11,7 @@ from afm_scan_bench.learning.learning import error_percent
 from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.mechanisms.product_sizes import EFFECTS, sized
 from afm_scan_bench.scans import default_plant, spec_at
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.table import Row, Table

@@ -10,7 +10,7 @@ from afm_scan_bench.learning.repeated import SCANS, repeated
 from afm_scan_bench.learning.rivals import LAWS, best_learned
 from afm_scan_bench.mechanisms.product_sizes import sized
 from afm_scan_bench.scans import default_plant, rms_percent, spec_at, tracking
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table
 from afm_scan_ros.simulation.scanner import PlantSpec

@@ -24,6 +24,7 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.effects.static_nonlinearity import Powers
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import power_by_band
+from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.types import Array
 
 SOFT, SLIP, SHIFT = ("amplitude_softening",), ("maxwell_slip",), ("parameter_shift",)
@@ -108,7 +109,7 @@ def test_pairs_are_tried_only_beside_a_set_that_leaves_something(left: float, pa
         )
 
     search.likelihood = cast("HeldOutLikelihood", MadeUp())
-    search.__dict__.update(_has=(), _progress=lambda _: None, _trial=made)
+    search.__dict__.update(_has=(), _tally=Tally(lambda _: None), _trial=made)
     assert search.run().likeliest == SOFT
     assert sum(len(names) == 2 for names in tried) == pairs
 

@@ -21,6 +21,7 @@ from afm_scan_ros.core.diagnosis.search import ModelSearch, Selection
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, log_density
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
+from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.types import Array
 
 BOTH = ("extra_resonance", "rate_dependent_hysteresis")
@@ -87,7 +88,7 @@ class Foretold(CandidateFitter):
 
 def selected(fitter: CandidateFitter) -> Selection:
     features = ResidualFeatures(1.0, *4 * (np.zeros(2),), ())
-    return ModelSearch(fitter, lambda _: features, lambda _: None).select()
+    return ModelSearch(fitter, lambda _: features, Tally(lambda _: None)).select()
 
 
 def names(found: Selection) -> set[str]:

@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.state_space.fit import fit_state_space, re
 from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import joined
+from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.types import Array, ProgressCallback
 
 MOST = 2
@@ -88,7 +89,7 @@ class CoupledSearch:
     ) -> None:
         self.likelihood = HeldOutLikelihood.of(scanner, records)
         self._has, self._records = tuple(e.name for e in scanner.effects), records
-        self._order, self._progress = scanner.linear.order, progress
+        self._order, self._tally = scanner.linear.order, Tally(progress)
 
     def run(self) -> SetPosterior:
         """Search until the likeliest set lacks nothing, or no larger one is likelier."""
@@ -99,8 +100,10 @@ class CoupledSearch:
             best = max(trials.values(), key=lambda trial: trial.log_posterior)
             if len(best.names) < size - 1 or (best.adequate and best.bands.unremarkable):
                 break
-            for names in _extended(trials, size, self._has):
-                self._progress(" and ".join(names))
+            larger = [*_extended(trials, size, self._has)]
+            self._tally.plan(len(larger))
+            for names in larger:
+                self._tally.begin(f"fitting {' and '.join(names)}")
                 if trial := self._trial(names):
                     trials[names] = trial
                 else:

@@ -41,7 +41,7 @@ from afm_scan_ros.core.identification.state_space.spectra import (
     reliability,
 )
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import Array, ProgressCallback, floats
+from afm_scan_ros.core.types import Array, ProgressCallback, Step, floats
 
 GROWTH = 1.25
 """From an order to the next that is tried."""
@@ -141,11 +141,11 @@ def identify_coupled(
     taught = Teaching.of(periods, kept)
     judge = Teaching.of(periods, left_out).middle
     order = setting.states or order_by_evidence(taught.middle, judge, progress)
-    progress(f"a model of {order} states, without one record of each level")
+    progress(Step(f"a model of {order} states, without one record of each level", 0, 2))
     trial = _fitted(taught, order, setting.effects)
     errors = tuple(_error(trial.model, periods, level) for level in left_out)
     _refuse_worse(errors, trial, periods, left_out)
-    progress(f"a model of {order} states")
+    progress(Step(f"a model of {order} states", 1, 2))
     found = _fitted(Teaching.of(periods, levels), order, setting.effects)
     reach = PEAK_SCATTER * float(max(np.abs(record.drive).max() for record in records))
     model = found.model

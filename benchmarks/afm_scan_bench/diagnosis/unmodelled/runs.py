@@ -14,7 +14,7 @@ from afm_scan_bench.diagnosis.unmodelled.judge import HELD, Statement, judged
 from afm_scan_bench.diagnosis.unmodelled.parameters import ParameterComparison, compared
 from afm_scan_bench.diagnosis.unmodelled.scanner import Size, healthy_scanner, size_of
 from afm_scan_bench.session import InProcessSession
-from afm_scan_ros.cli.options import working
+from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.closed_loop import FIRST, diagnose_until_resolved
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis, diagnose
 from afm_scan_ros.core.record import Record
