@@ -135,6 +135,8 @@ def _show_axis(axis: str, found: FittedAxis) -> None:
     )
     for record in found.records:
         say(f"   {record.name}, left by the model: {_text(record.misfit, 1e9, 'nm')}")
+        if record.fitted_otherwise:
+            say(f"   {record.name}, left by the fit: {_text(record.by_fit, 1e9, 'nm')}")
     for one in found.validations:
         say(f"   {one.record}, held out: {_text(one.misfit, 1e9, 'nm')}")
     say(f"   direct inverse of the hysteresis: {_text(found.direct, 1e3, 'mV')}")

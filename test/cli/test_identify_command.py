@@ -11,8 +11,10 @@ import afm_scan_ros as afm
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.identify import identify
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
+from helpers.fit_cases import OPERATORS, levels, record
 
 INFO = ScanInfo("one", 0, "creep", 1e-3, 100)
 RAMP = np.linspace(0.0, 1.0, 100)
@@ -62,6 +64,22 @@ def test_a_sample_at_a_distance_from_the_update_is_refused(tmp_path: Path) -> No
     bag = write(tmp_path / "bag", evolve(INFO, trigger_offset=2e-4))
     with pytest.raises(InputError, match="s from the converter's update"):
         afm.read_record(bag)
+
+
+@pytest.mark.parametrize("of_fit", [0.5, 1.0])
+def test_what_the_fit_left_is_said_where_the_model_leaves_otherwise(
+    of_fit: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = afm.identify([record(OPERATORS["plays"], levels(1, 6, 300))])
+    axis = found.fit.axes["x"]
+    by_fit = evolve(axis.records[0].misfit, sigma=of_fit * axis.records[0].misfit.sigma)
+    changed = evolve(axis, records=(evolve(axis.records[0], by_fit=by_fit),))
+    given = afm.Model(found.scanner, "", Identification({"x": changed}))
+    monkeypatch.setattr("afm_scan_ros.identification.identify", lambda *_, **__: given)
+    words = [str(write(tmp_path / "bag", INFO)), "--out", str(tmp_path / "model.yaml")]
+    said = CliRunner().invoke(identify, words, catch_exceptions=False).output
+    assert "levels, left by the model: sigma" in said
+    assert ("levels, left by the fit: sigma" in said) == (of_fit < 0.9)
 
 
 @pytest.mark.parametrize("name", ["model.yaml", "model.npz", "model.fit.json", "model.fit.html"])

@@ -570,6 +570,12 @@ class FitSettings:
         "sizes of scans whose variance chooses the directions, each half the last",
         "images are taken at such sizes",
     )
+    stated_loss: float = setting(
+        0.1,
+        "1",
+        "change of what is left of a record, from which on that of fit and model are both stated",
+        "a standard deviation is known as well from fifty samples",
+    )
     scan_samples: int = setting(
         1000,
         "1",

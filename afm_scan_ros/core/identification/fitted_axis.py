@@ -15,6 +15,7 @@ from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.signals import known_from, steps_read_after
+from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.findings import (
     Finding,
@@ -50,8 +51,10 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 class FittedRecord:
     """A record that was fitted: what the model leaves (m) at ``seconds`` from its start, (n,) both.
 
-    ``drive`` (V) and the model's ``effective`` input F (V) are those of all its samples, and
-    ``response`` is that of its displacement (m) to F, of the lines that it shows.
+    The model is the one that is saved, and begins at depolarised rest; ``by_fit`` is what the fit
+    left (m), which has finer surfaces and may have estimated how the record began. ``drive`` (V)
+    and the fit's ``effective`` input F (V) are those of all its samples, and ``response`` is that
+    of its displacement (m) to F, of the lines that it shows.
     """
 
     name: str
@@ -61,11 +64,18 @@ class FittedRecord:
     drive: Array
     effective: Array
     response: FrequencyResponse
+    by_fit: Misfit
 
     @property
     def misfit(self) -> Misfit:
         """Standard deviation and maximum of what the model leaves, m (Eqs. 2, 3)."""
         return misfit(self.left)
+
+    @property
+    def fitted_otherwise(self) -> bool:
+        """Whether the model leaves more or less than the fit by a share that is stated."""
+        apart = abs(self.misfit.sigma - self.by_fit.sigma)
+        return apart > DEFAULT_SETTINGS.stated_loss * self.by_fit.sigma
 
 
 @frozen(eq=False)
@@ -127,7 +137,7 @@ def identify_axis(
         operator=operator,
         discrepancy=fit.discrepancy,
         deviation=deviation,
-        records=tuple(_fitted_records(fit)),
+        records=tuple(_fitted_records(fit, model)),
         direct=_direct_misfit(model, [one.drive for one in fit.records]),
         warnings=(
             *_read_after(model, records, axis),
@@ -139,12 +149,24 @@ def identify_axis(
     )
 
 
-def _fitted_records(fit: AxisFit) -> Iterator[FittedRecord]:
+def _fitted_records(fit: AxisFit, model: AxisModel) -> Iterator[FittedRecord]:
     simulated, residuals = fit.simulated(fit.theta), fit.residuals()
-    for one, simulation, left in zip(fit.records, simulated, residuals, strict=True):
-        drive, effective = one.drive, simulation.effective
+    for k, (one, simulation, by_fit) in enumerate(
+        zip(fit.records, simulated, residuals, strict=True)
+    ):
+        drive, effective, left = one.drive, simulation.effective, _left_by(model, fit, k)
         response = local_response(drive, effective, one.displacement, one.period)
-        yield FittedRecord(one.name, one.period, one.seconds, left, drive, effective, response)
+        every_sample = drive, effective, response
+        yield FittedRecord(one.name, one.period, one.seconds, left, *every_sample, misfit(by_fit))
+
+
+def _left_by(model: AxisModel, fit: AxisFit, k: int) -> Array:
+    """What a model leaves (m) of a record of a fit, less what is free in the record."""
+    one = fit.records[k]
+    cascade = forward(model, one.period)
+    moved = cascade.apply(cascade.at_rest(), one.given)[1]
+    left = averaged(one.displacement - moved, one.block)[one.used]
+    return fit.free_of(k, gathered=False).without(left)
 
 
 def _direct_misfit(model: AxisModel, drives: Sequence[Array]) -> Misfit:

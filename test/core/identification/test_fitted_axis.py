@@ -13,6 +13,7 @@ from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.effects.vibration import Vibration, VibrationModel
+from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.identification.findings import (
     Hum,
     NotValidated,
@@ -90,6 +91,27 @@ def fit(request: pytest.FixtureRequest) -> FittedAxis:
 
 def test_records_are_matched_to_the_noise(fit: FittedAxis) -> None:
     assert 0.9 * NOISE < fit.records[0].misfit.sigma < 1.1 * NOISE
+
+
+def test_what_is_left_of_a_record_is_that_of_the_model_that_is_saved(fit: FittedAxis) -> None:
+    """As ``predict`` gives it from depolarised rest, but for what is free in the record."""
+    record, model = fit.records[0], forward(fit.model, SAMPLE_PERIOD)
+    given = measured("loops", LOOPS, 2)
+    left = given.displacement[:, 0] - model.apply(model.at_rest(), LOOPS)[1]
+    length = record.seconds[1] - record.seconds[0]
+    blocks = averaged(left, round(length / SAMPLE_PERIOD))[
+        round(record.seconds[0] / length - 0.5) :
+    ]
+    assert len(record.left) == len(blocks)
+    assert np.corrcoef(record.left, blocks)[0, 1] > 0.95
+
+
+def test_fit_and_model_are_both_stated_where_they_leave_otherwise(fit: FittedAxis) -> None:
+    record = fit.records[0]
+    assert not record.fitted_otherwise
+    for share, otherwise in ((0.85, True), (0.95, False), (1.15, True)):
+        by_fit = evolve(record.by_fit, sigma=record.misfit.sigma / share)
+        assert evolve(record, by_fit=by_fit).fitted_otherwise == otherwise
 
 
 def within(interval: ParameterInterval, true: float) -> bool:

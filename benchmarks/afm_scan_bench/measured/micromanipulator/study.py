@@ -86,9 +86,10 @@ class Study:
 
     @property
     def fitted(self) -> float:
-        """Rms misfit, m, to all data fitted."""
-        left = np.concatenate([one.left for one in self.model.fit.axes["x"].records])
-        return float(np.sqrt(np.mean(left**2)))
+        """Rms misfit of the fit, m, to all data fitted."""
+        each = [one.by_fit for one in self.model.fit.axes["x"].records]
+        squares = sum((one.samples - 1) * one.sigma**2 for one in each)
+        return float(np.sqrt(squares / sum(one.samples for one in each)))
 
     @cached_property
     def twin(self) -> Model:
