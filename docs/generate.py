@@ -35,6 +35,15 @@ TABLES = {
 }
 """Tables that are too long for the pages that discuss them: a page of the site each."""
 
+SOURCES = {
+    "reference/api.md": "afm_scan_ros/__init__.py",
+    "reference/nodes.md": "launch/scan.launch.py",
+    "reference/settings.md": "docs/settings_page.py",
+    "reference/messages.md": "msg",
+    "reference/files.md": "config",
+}
+"""What links to generated pages lead to in a checkout, which has no such pages."""
+
 API = (
     "Public is what `import afm_scan_ros as afm` offers. Units are SI: m, V, s, Hz. Arrays have the"
     " shape `(n,)` or `(n, channels)`. An example:"
@@ -76,9 +85,10 @@ def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own type
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Turn links to notebooks and tables, which work in a checkout, into links to their pages.
+    """Turn links that work in a checkout into links to the pages that the site makes of the files.
 
-    Where a link to a table is a paragraph, the table stands there.
+    These files are notebooks, tables, and what ``SOURCES`` lists. Where a link to a table is a
+    paragraph, the table stands there.
     """
     tables = {path.stem: path for path in TABLES.values()}
     markdown = re.sub(
@@ -88,6 +98,8 @@ def on_page_markdown(markdown: str, **_: object) -> str:
         flags=re.MULTILINE,
     )
     markdown = re.sub(r"\]\(([^)]*tables/\w+)\.csv\)", r"](\1.md)", markdown)
+    for page, source in SOURCES.items():
+        markdown = re.sub(rf"\]\(\.\./((\.\./)*){re.escape(source)}\)", rf"](\1{page})", markdown)
     return re.sub(r"\]\(\.\./((\.\./)*examples/\w+)\.ipynb\)", r"](\1.md)", markdown)
 
 
