@@ -127,6 +127,7 @@ def test_one_axis_is_saved_and_loaded(tmp_path: Path) -> None:
 def test_a_file_cut_before_its_second_axis_is_refused(tmp_path: Path) -> None:
     BOTH.save(tmp_path / "m.yaml")
     text = (tmp_path / "m.yaml").read_text("utf-8")
+    text = "".join(line for line in text.splitlines(keepends=True) if "content_sha256" not in line)
     (tmp_path / "m.yaml").write_text(text[: text.index("\n'y':") + 1], "utf-8")
     with pytest.raises(afm.InputError, match=r"m.npz holds y_forward, y_direct, which the file"):
         afm.load_model(tmp_path / "m.yaml")
