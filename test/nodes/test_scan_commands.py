@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli import options
+from afm_scan_ros.cli import progress
 from afm_scan_ros.cli.listening import ScanWatch
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.orders import ScanFiles
@@ -33,7 +33,7 @@ def files(spec: Path, bag: Path) -> ScanFiles:
 def test_the_slowest_node_says_how_far_a_scan_is(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(options, "EVERY", 0.0)  # so that every step is told
+    monkeypatch.setattr(progress, "EVERY", 0.0)  # so that every step is told
     with showing("a scan") as shown:
         watch = ScanWatch(shown)
         watch.meet(SimpleNamespace(total_samples=1000))
