@@ -4,7 +4,6 @@ MkDocs runs this file as a hook. ``pages`` needs nothing but the package and its
 """
 
 import ast
-import base64
 import csv
 import importlib
 import json
@@ -15,6 +14,7 @@ from typing import Any
 
 import attrs
 import click
+from bokeh.resources import Resources
 
 import afm_scan_ros
 from afm_scan_ros.cli.main import BENCHMARKS, COMMANDS, cli
@@ -28,6 +28,7 @@ from names_of_ros import names_of_ros
 from settings_page import settings_page
 
 ROOT = Path(__file__).parents[1]
+LIBRARY = "examples/bokeh.js"
 NOTEBOOKS = {f"examples/{path.stem}.md": path for path in (ROOT / "examples").glob("*.ipynb")}
 TABLES = {
     str(path.relative_to(ROOT / "docs").with_suffix(".md")): path
@@ -122,8 +123,7 @@ def on_page_content(html: str, **_: object) -> str:
 def pages() -> dict[str, str | bytes]:
     """Return every generated file of the site: its path in ``docs/``, and its content."""
     made: dict[str, str | bytes] = {name: make() for name, make in PAGES.items()}
-    for name, notebook in NOTEBOOKS.items():
-        made |= notebook_page(name, notebook)
+    made |= {name: notebook_page(notebook) for name, notebook in NOTEBOOKS.items()}
     return made | {name: table_of(path) for name, path in TABLES.items()}
 
 
@@ -378,21 +378,24 @@ def _parameters(parameters: Iterable[NodeParameter]) -> str:
     return _table(("parameter", "default", "allowed", "meaning"), rows)
 
 
-def notebook_page(name: str, path: Path) -> dict[str, str | bytes]:
-    """Return a notebook as a page, and its pictures."""
-    parts, made = [], {}
-    for number, cell in enumerate(json.loads(path.read_text("utf-8"))["cells"]):
+def notebook_page(path: Path) -> str:
+    """Return a notebook as a page, whose pictures find Bokeh's library in ``LIBRARY``."""
+    parts = [f'<script src="../{Path(LIBRARY).name}"></script>']
+    for cell in json.loads(path.read_text("utf-8"))["cells"]:
         source = "".join(cell["source"])
         parts.append(f"```python\n{source}\n```" if cell["cell_type"] == "code" else source)
         for output in cell.get("outputs", ()):
             data = output.get("data", {})
-            if "image/png" in data:
-                picture = f"{path.stem}_{number}.png"
-                made[f"examples/{picture}"] = base64.b64decode(data["image/png"])
-                parts.append(f"![What the cell draws]({picture})")
+            if "text/html" in data:
+                parts.append(re.sub(r"\n\s*\n", "\n", "".join(data["text/html"])))
             elif text := "".join(output.get("text", data.get("text/plain", ()))):
                 parts.append(f"```text\n{text.rstrip()}\n```")
-    return {name: "\n\n".join(parts) + "\n", **made}
+    return "\n\n".join(parts) + "\n"
+
+
+def bokeh() -> str:
+    """Return Bokeh's library, which the pictures of notebooks need."""
+    return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 
 def _paragraphs(text: str | None) -> str:
@@ -417,6 +420,7 @@ def _unescaped(text: str) -> str:
 
 
 PAGES = {
+    LIBRARY: bokeh,
     "reference/api.md": api,
     "reference/commands.md": commands,
     "reference/nodes.md": nodes,
