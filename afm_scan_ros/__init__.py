@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from afm_scan_ros.bag.record import read_record
     from afm_scan_ros.core.errors import InputError, ScanError
     from afm_scan_ros.core.limits import DriveLimits
-    from afm_scan_ros.core.progress import timed
     from afm_scan_ros.core.record import Record
     from afm_scan_ros.core.scan_spec import ScanSpec
     from afm_scan_ros.core.trajectory import trajectory
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from afm_scan_ros.features.learning.measured import Learned, learn
     from afm_scan_ros.identification import identify
     from afm_scan_ros.model import Model, load_model
+    from afm_scan_ros.progress import timed
 
     __version__: str
 
@@ -72,7 +72,7 @@ _MODULES = {
     "load_model": "model",
     "read_image": "features.images.files.formats",
     "read_record": "bag.record",
-    "timed": "core.progress",
+    "timed": "progress",
     "trajectory": "core.trajectory",
 }
 """Where each name is from: a module is imported when the first of its names is used."""

@@ -13,8 +13,8 @@ from pathlib import Path
 from bokeh.resources import Resources
 from PIL import Image
 
-from afm_scan_ros.core.progress import timed
 from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.progress import timed
 from afm_scan_ros.report.html import page
 from afm_scan_ros.report.interactive import drawn
 from afm_scan_ros.report.paper import paper_figure

@@ -34,7 +34,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> Shown:
 def test_a_picture_is_an_image_until_the_library_draws_it() -> None:
     time = np.linspace(0.0, 1.0, 500)
     curve, of = Curve(time, np.sin(9.0 * time), "a sine"), "A sine and its <image>"
-    image = Map(np.outer(time[:64], time[:64]), 0.0, 1.0, 0.0, 1.0, "nm", 0.0, 1.0)
+    image = Map(np.outer(time[:64], time[:64]), (0.0, 1.0, 0.0, 1.0), "nm", 0.0, 1.0)
     rows = [[Panel([curve], "time in s", "x in nm")], [Panel([image], "x in µm", "y in µm")]]
     page = html_of(Picture("picture", of, rows))
     assert '<img alt="A sine and its &lt;image&gt;" src="data:image/png;base64,' in page

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TaskID, TextColumn
 from rich.text import Text
 
-from afm_scan_ros.core.progress import Stopwatch
 from afm_scan_ros.core.types import ProgressCallback, Step
+from afm_scan_ros.progress import Stopwatch
 from afm_scan_ros.report.terminal import say, showing_log, visible
 
 EVERY = 20.0

@@ -6,8 +6,8 @@ import pytest
 
 from afm_scan_ros.cli import progress
 from afm_scan_ros.cli.progress import EVERY, Lines, working
-from afm_scan_ros.core.progress import Stopwatch
 from afm_scan_ros.core.types import Step
+from afm_scan_ros.progress import Stopwatch
 
 
 class Clock:
@@ -66,7 +66,7 @@ def test_a_log_hears_of_a_step_that_lasts(
         while len(lines) < 2:
             time.sleep(0.01)
             lines += capsys.readouterr().err.splitlines()
-    assert set(lines) == {"identifying: x: looking for modes (0 s)"}
+    assert all(line.startswith("identifying: x: looking for modes (") for line in lines)
 
 
 def test_a_log_hears_how_long_what_is_counted_still_takes(

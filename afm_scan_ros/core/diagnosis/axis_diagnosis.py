@@ -29,9 +29,9 @@ from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
-from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
+from afm_scan_ros.core.tally import Tally
 from afm_scan_ros.core.types import Array, floats
 
 ALONG = TYPICAL_SHARE / FREEDOM

@@ -44,9 +44,9 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import with_overshoot
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
-from afm_scan_ros.core.progress import Tally
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import synchronised
+from afm_scan_ros.core.tally import Tally
 from afm_scan_ros.core.types import ProgressCallback
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)

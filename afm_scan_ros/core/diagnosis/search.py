@@ -20,7 +20,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
 )
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.progress import Tally
+from afm_scan_ros.core.tally import Tally
 from afm_scan_ros.core.types import Array
 
 NEARLY = 0.01

@@ -1,6 +1,5 @@
 """Progress of long computations: the time that they have taken, and what is left of them."""
 
-from collections import Counter
 from collections.abc import Callable
 from time import monotonic
 
@@ -51,32 +50,6 @@ class Stopwatch:
         if self._step is None or left is None or left < 1.0:
             return elapsed
         return f"{elapsed}, {'at least' if self._step.more else 'about'} {left:.0f} s left"
-
-
-@define
-class Tally:
-    """Counts the parts of a search, of which more are planned as it goes on.
-
-    Parts that are ``named`` apart, as those of each axis, are counted together.
-    """
-
-    _progress: ProgressCallback
-    _name: str = ""
-    _counts: Counter[str] = field(factory=Counter)
-
-    def named(self, name: str) -> "Tally":
-        """Return a tally that begins what it says with a name."""
-        return Tally(self._progress, f"{self._name}{name}", self._counts)
-
-    def plan(self, parts: int) -> None:
-        """Count parts that are to be done, or fewer of them where ``parts`` is negative."""
-        self._counts["planned"] += parts
-
-    def begin(self, doing: str, parts: int = 1) -> None:
-        """Say what is being done, which takes so many of the parts that are planned."""
-        done, planned = self._counts["done"], self._counts["planned"]
-        self._progress(Step(f"{self._name}{doing}", done, planned, more=True))
-        self._counts["done"] += parts
 
 
 def timed(show: Callable[[str], object]) -> ProgressCallback:

@@ -4,8 +4,9 @@ import pytest
 from attrs import define
 
 import afm_scan_ros as afm
-from afm_scan_ros.core.progress import Stopwatch, Tally
+from afm_scan_ros.core.tally import Tally
 from afm_scan_ros.core.types import Step
+from afm_scan_ros.progress import Stopwatch
 
 
 @define
@@ -70,7 +71,7 @@ def test_a_callback_shows_the_time_beside_what_is_done(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock, shown = Clock(), []
-    monkeypatch.setattr("afm_scan_ros.core.progress.Stopwatch", lambda: Stopwatch(clock))
+    monkeypatch.setattr("afm_scan_ros.progress.Stopwatch", lambda: Stopwatch(clock))
     report = afm.timed(shown.append)
     report("x: modes")
     clock.now = 12.4
