@@ -40,7 +40,7 @@ COMMON = (
         "progress_timeout_s",
         0.3,
         "Scan time in which the slowest node may finish no sample until the drive ramps down",
-        low=0.1,
+        low=0.2,
     ),
     NodeParameter("time_scale", 1.0, "Duration over scan time: 1 for real time", low=0.0),
     NodeParameter(
@@ -240,11 +240,15 @@ class ScanNode(Node, ABC):
         return self.peers.standstill(own, self.scan, time.monotonic(), timeout, pause)
 
     def longest_standstill(self) -> float:
-        """Return how long (s) samples may stand still: a block is output meanwhile."""
+        """Return how long (s) samples may seem to stand still.
+
+        A block is output meanwhile, and what a node has finished is heard a heartbeat later.
+        """
         if not self.settings["real_time"]:
             return float(self.settings["liveness_timeout_s"])
         scale = max(1.0, float(self.settings["time_scale"]))
-        return scale * float(self.settings["progress_timeout_s"] + self._longest_block)
+        timeout = float(self.settings["progress_timeout_s"] + self._longest_block)
+        return scale * timeout - self.safety.heartbeat
 
     def _longest_pause(self) -> float:
         """Return how long (s) a node that works may seem to stand: a block, and two heartbeats."""
