@@ -1,7 +1,7 @@
 """The time from a fault to outputs at rest, from what the process that owns them recorded.
 
-A calibration record of hysteresis is made in real time, by a source as it is and a scanner's node
-with a fault in it.
+A record at high drive is made in real time, by a source as it is and a scanner's node with a fault
+in it.
 """
 
 import json
@@ -38,7 +38,6 @@ from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE
 
 RECORD: Mapping[str, object] = {
-    "kind": "hysteresis",
     "scan_id": "this",
     "required_nodes": [SCANNER, RECORDER],
     "min_subscriptions": 2,
@@ -50,6 +49,8 @@ READERS = 2
 """Readers of the drive: the scanner and the recorder."""
 PERIOD = 5e-5
 """Sample period (s) of the record."""
+RISE = 0.5
+"""Seconds in which the drive rises, before it swings between 3.4 and 4 V at 2 Hz."""
 LONGEST_RECORD = 10.0
 """Seconds in which a record that runs reaches the fault, on a busy machine."""
 LONGEST = 200
@@ -181,6 +182,16 @@ class FaultyProcesses:
                 process.wait()
 
 
+def record_at(folder: Path) -> dict[str, object]:
+    """Return the source's parameters; the drive, of x and y opposed, is written to a file."""
+    time = PERIOD * np.arange(round((LONGEST_RECORD + 1.0) / PERIOD))
+    level = np.minimum(time / RISE, 1.0) * (3.7 - 0.3 * np.cos(4.0 * np.pi * time))
+    folder.mkdir(parents=True, exist_ok=True)
+    drive = np.column_stack([level, -level])
+    np.savez(file := folder / "drive.npz", drive_v=drive, sample_period_s=PERIOD)
+    return {**RECORD, "drive_file": str(file)}
+
+
 def _started(
     run: str,
     fault: Fault,
@@ -227,10 +238,9 @@ def watch() -> None:
 
 def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     """Inject a fault into one scan, and see when the outputs were at rest."""
-    folder.parent.mkdir(exist_ok=True)
-    done = DriveOutcome()
-    with Trial(folder, **{SOURCE: RECORD, RECORDER: RECORDED}) as trial:
-        neighbours = _start_neighbours(trial, folder, fault)
+    given, done = record_at(folder.with_name(f"{folder.name}_drive")), DriveOutcome()
+    with Trial(folder, **{SOURCE: given, RECORDER: RECORDED}) as trial:
+        neighbours = _start_neighbours(trial, folder, fault, given)
         scanner = FaultyProcesses.start(folder, fault)
         try:
             _follow(trial, scanner, done)
@@ -244,13 +254,15 @@ def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     return done
 
 
-def _start_neighbours(trial: Trial, folder: Path, fault: Fault) -> "list[subprocess.Popen[bytes]]":
+def _start_neighbours(
+    trial: Trial, folder: Path, fault: Fault, source: Mapping[str, object]
+) -> "list[subprocess.Popen[bytes]]":
     """Start source and recorder; return the one that has a fault of its own."""
     faulty = fault.to if fault.method and fault.to in (SOURCE, RECORDER) else ""
     trial.start(*(name for name in (SOURCE, RECORDER) if name != faulty))
     if not faulty:
         return []
-    given = {**RECORD} if faulty == SOURCE else {**RECORDED, "bag": trial.bag}
+    given = source if faulty == SOURCE else {**RECORDED, "bag": trial.bag}
     return [_started("faulty_neighbour", fault, folder / "outputs.txt", given, {})]
 
 

@@ -22,7 +22,7 @@ from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
 
 FAULT_AT = 20_000
-"""Sample from which there is a fault: after a second, with 4 V on both axes."""
+"""Sample from which there is a fault: after a second."""
 HANG = 120
 """Seconds."""
 LATE = 0.8
