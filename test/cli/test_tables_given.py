@@ -37,6 +37,7 @@ def test_the_advice_of_a_refusal_works_as_typed(file: Path) -> None:
     assert identified(file, *advice.split()).exit_code == 0
 
 
+@pytest.mark.evidence
 def test_units_in_headings_are_enough_and_a_warning_reports_it(
     file: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 
 from afm_scan_ros.cli.main import cli
@@ -26,6 +27,7 @@ def written(folder: Path, seed: int, count: int) -> str:
     return str(path)
 
 
+@pytest.mark.evidence
 def test_the_spring_that_a_linear_model_lacks_is_found_by_commands(tmp_path: Path) -> None:
     fitted, held_out, fresh = (written(tmp_path, seed, 4000) for seed in (1, 2, 3))
     model, out = str(tmp_path / "model.yaml"), tmp_path / "lacking"

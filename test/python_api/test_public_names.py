@@ -34,7 +34,13 @@ def test_every_class_and_function_of_the_api_has_an_example() -> None:
     assert set(CALLABLES) - made - described <= set(RUNS)
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.evidence] * (name == "identify_from_images"))
+        for name in RUNS
+    ],
+)
 def test_the_example_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = doctest.DocTestFinder(recurse=False).find(getattr(afm, name), name)

@@ -92,6 +92,7 @@ def test_the_command_writes_the_same_figures_everywhere(
     assert files[2].read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.evidence
 def test_figures_are_written_beside_the_report(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

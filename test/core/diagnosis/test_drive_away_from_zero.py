@@ -1,6 +1,7 @@
 """A scanner whose drive stays away from 0 V is diagnosed: it rests at the nearest that it had."""
 
 import numpy as np
+import pytest
 
 import afm_scan_ros as afm
 
@@ -16,6 +17,7 @@ def recorded(seed: int, tone: float = 0.0) -> afm.Record:
     return afm.Record(drive, seen + NOISE * rng.standard_normal(COUNT), PERIOD, name=f"scan {seed}")
 
 
+@pytest.mark.evidence
 def test_a_tone_is_found_and_a_healthy_record_is_none() -> None:
     model = afm.identify([recorded(seed) for seed in (1, 2)], linear=True)
     assert afm.diagnose(model, [recorded(3)]).verdict == "model_sufficient"

@@ -139,7 +139,7 @@ def test_what_is_all_but_certain_leaves_little_to_learn(share: float) -> None:
 @pytest.mark.parametrize(
     "late", [1e-5, *(pytest.param(late, marks=pytest.mark.evidence) for late in (2e-6, 1e-4))]
 )
-@pytest.mark.parametrize("name", ["broadband", "hold"])
+@pytest.mark.parametrize("name", [pytest.param("broadband", marks=pytest.mark.evidence), "hold"])
 def test_a_free_choice_is_never_worse_than_the_library(name: str, late: float) -> None:
     names = ("delay", "input_lag")
     chains = [effect_type(n).form("").insert(CHAIN, np.array([late])) for n in names]

@@ -1,6 +1,7 @@
 """A model that has an effect already is extended by another: the first one counts once."""
 
 import numpy as np
+import pytest
 from attrs import evolve
 
 import afm_scan_ros as afm
@@ -9,6 +10,7 @@ from afm_scan_ros.core.model import Added, ScannerModel
 MODE = Added("extra_resonance", "series_mode", (0.05, 1300.0, 0.03))
 
 
+@pytest.mark.evidence
 def test_the_extended_model_predicts_what_was_fitted() -> None:
     default = afm.load_model()
     axis = evolve(default.scanner.axis("x"), added=(MODE,))

@@ -80,6 +80,7 @@ def test_an_error_that_the_model_admits_is_no_effect() -> None:
     assert denied.selection.posterior.of_effect("parameter_shift") > 0.1
 
 
+@pytest.mark.evidence
 def test_an_effect_is_named_beside_a_wide_direction() -> None:
     late = 2e-4
     found = diagnosed(WIDE, recorded(FACTOR, late))

@@ -51,6 +51,7 @@ def error(model: afm.Model, record: afm.Record) -> float:
     return float(np.std(left) / np.std(record.displacement))
 
 
+@pytest.mark.evidence
 def test_the_models_own_error_explains_the_residual_unless_asked(hardening: afm.Model) -> None:
     assert error(hardening, recorded(HARDENING, 4)) > 0.05
     assert afm.diagnose(hardening, [recorded(HARDENING, 3)]).verdict == "model_sufficient"

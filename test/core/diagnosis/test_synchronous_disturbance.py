@@ -69,6 +69,7 @@ def traced(*records: Record) -> ScannerDiagnosis:
     return found
 
 
+@pytest.mark.evidence
 def test_an_asynchronous_disturbance_is_named(healthy: Scan) -> None:
     assert traced(scanned(healthy, OUT_OF_STEP)).verdict == FOUND
 

@@ -203,6 +203,7 @@ def test_no_record_that_moves_is_refused() -> None:
         fit_axis([still], "x")
 
 
+@pytest.mark.evidence
 def test_the_fit_does_not_depend_on_the_order_of_records() -> None:
     halves = [record(OPERATORS["plays"], levels(seed, 20, 1000)) for seed in (3, 4)]
     one, two = (fit_axis(list(order), "x") for order in (halves, halves[::-1]))

@@ -50,6 +50,7 @@ def test_waves_about_a_resonance_say_what_the_gain_is() -> None:
     assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.02)
 
 
+@pytest.mark.evidence
 def test_a_mode_is_seen_beside_a_record_of_noise() -> None:
     """Noise has many lines, but none of the residuals about the resonance."""
     driven, slow = waves(), levels(3, 10, 40_000)
@@ -101,6 +102,7 @@ def test_neither_plays_nor_lags_hide_a_mode() -> None:
     assert found.mode[0] / (2.0 * np.pi) == pytest.approx(FREQUENCY, rel=0.05)
 
 
+@pytest.mark.evidence
 def test_no_mode_explains_more_than_is_left_whatever_is_tried_beside_it() -> None:
     """What a mode explains beyond its imitation is a small difference of large products."""
     cycles = np.interp(np.arange(12_000) % 1000, [0, 500, 1000], [0.0, 1.0, 0.0])

@@ -36,6 +36,7 @@ def test_the_noise_of_a_measured_drive_is_found(seed: int, share: float) -> None
     assert found == pytest.approx(sigma, rel=0.5)  # a third of the windows hold a turn
 
 
+@pytest.mark.evidence
 @given(SEEDS, st.floats(0.05, 0.7))
 def test_what_a_converter_was_given_stays(seed: int, highest: float) -> None:
     for drive in (ramps(seed), multisine(seed, highest), np.repeat(ramps(seed)[::200], 300)):

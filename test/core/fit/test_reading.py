@@ -36,7 +36,7 @@ def recorded(drive: Array, *, after: bool, seed: int) -> afm.Record:
     return afm.Record(drive, seen + noise, PERIOD, name=f"loops {seed}")
 
 
-@pytest.mark.parametrize("after", [True, False])
+@pytest.mark.parametrize("after", [pytest.param(True, marks=pytest.mark.evidence), False])
 def test_slow_loops_are_predicted_as_they_were_read(tmp_path: Path, *, after: bool) -> None:
     drives = loops(100, 100, 80, 60, 40, 20, 50, 90), loops(100, 70, 30, 85, 55, 10, 100)
     model = afm.identify([recorded(one, after=after, seed=k) for k, one in enumerate(drives)])
@@ -58,7 +58,9 @@ def test_a_few_loops_of_unknown_start_are_not_balanced_by_a_lead() -> None:
     assert np.std(missed[200:]) < 1e-3 * np.ptp(fresh.displacement)
 
 
-@pytest.mark.parametrize("digits", [6, 9, 17])
+@pytest.mark.parametrize(
+    "digits", [6, *(pytest.param(n, marks=pytest.mark.evidence) for n in (9, 17))]
+)
 def test_a_record_without_noise_is_identified(digits: int) -> None:
     """As made by a formula, and written with so many digits."""
     time = 1e-3 * np.arange(500)

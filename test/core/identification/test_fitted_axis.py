@@ -82,7 +82,9 @@ def error_on(found: FittedAxis, drive: Array) -> float:
     return float(np.std((model.apply(model.at_rest(), drive)[1] - moved(drive))[400:]))
 
 
-@pytest.fixture(scope="module", params=["depolarised", "unknown"])
+@pytest.fixture(
+    scope="module", params=["depolarised", pytest.param("unknown", marks=pytest.mark.evidence)]
+)
 def fit(request: pytest.FixtureRequest) -> FittedAxis:
     given = measured("loops", LOOPS, 2, request.param)
     held_out = measured("fresh", FRESH, 5, request.param, "validation")
@@ -157,6 +159,7 @@ def test_the_record_held_out_gives_the_error(fit: FittedAxis) -> None:
     assert not any(isinstance(each, NotValidated) for each in fit.warnings)
 
 
+@pytest.mark.evidence
 def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
     size = np.array([1.0, 1.0])
     records = [
@@ -168,6 +171,7 @@ def test_records_of_unlike_rates_and_sizes_are_fitted_together() -> None:
     assert error_on(found, fresh) < 3e-3 * np.ptp(moved(fresh))
 
 
+@pytest.mark.evidence
 def test_curves_that_turn_in_part_of_the_drive_predict_those_between() -> None:
     """A scanner without lag or creep: a sample later the displacement is where the drive led."""
 
@@ -206,6 +210,7 @@ def test_a_model_of_either_operator_is_saved_and_predicts_the_same(
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.ptp(expected))
 
 
+@pytest.mark.evidence
 def test_steps_alone_tell_creep_and_not_hysteresis() -> None:
     period = 0.01
     drive = np.repeat([0.0, 0.6, 1.2, 0.3], [500, 3000, 3000, 3000])

@@ -47,6 +47,7 @@ def test_a_ring_down_and_loops_predict_other_loops() -> None:
     assert np.std(residual) < 1.2e-9  # of which the sensor's noise is 1 nm
 
 
+@pytest.mark.evidence
 def test_a_staircase_is_a_slow_axis() -> None:
     drive = np.repeat(np.linspace(0.0, 40.0, 33), 400)
     model = afm.identify([afm.Record(drive, measured(drive), PERIOD, start="depolarised")])

@@ -61,7 +61,13 @@ def test_a_file_shows_what_the_bag_holds(spec: Path, plain: np.ndarray, tmp_path
     assert f"| scan | done | {info.total_samples} (100%) |" in states(file)
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGKILL, id="killed"),
+        pytest.param(signal.SIGSTOP, id="stopped", marks=pytest.mark.evidence),
+    ],
+)
 def test_a_view_that_falls_out_changes_no_sample(
     spec: Path, plain: np.ndarray, tmp_path: Path, number: signal.Signals
 ) -> None:
