@@ -28,8 +28,8 @@ export OMP_NUM_THREADS ?= 1
 help:
 	@echo "make demo           scan a simulated scanner without and with compensation; report in demo/"
 	@echo "make test           run the test suite of the product, with the nodes where ROS can be had"
-	@echo "make test-ros       run all of the suite on a ROS 2 made from wheels, with the oldest versions"
-	@echo "                    that are supported of what the package needs"
+	@echo "make test-ros       run the suite, and whole scans of nodes, on a ROS 2 made from wheels, with"
+	@echo "                    the oldest versions that are supported of what the package needs"
 	@echo "make test-faults    inject faults into scans of nodes, on the same ROS"
 	@echo "make test-evidence  run the tests of the benchmarks, and those of the product that take long"
 	@echo "make check          run the linter, the type checker and the examples, and build the site"
@@ -48,24 +48,26 @@ test-suite: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL) $(SUITE)
 
 test-nodes: $(ROS)/ready
-	$(call pytest_on_ros,-m "not evidence and not long" test/nodes)
+	$(call pytest_on_ros,-n 2 -m "not evidence and not long" test/nodes)
 
 # This ROS has numpy, scipy and the others in Ubuntu 24.04's versions, the oldest that are supported.
-# Where ROS has them, the nodes are tested on its other usual middleware too.
+# 'make test' tests the nodes on it, all but what takes whole scans. Where ROS has them, they are
+# tested on its other usual middleware too.
 test-ros: $(ROS)/ready
-	$(call pytest_on_ros,--hypothesis-profile=floor $(SUITE))
+	$(call pytest_on_ros,-n 3 --hypothesis-profile=floor $(SUITE) --ignore=test/nodes)
+	$(call pytest_on_ros,-n 2 -m "long and not evidence" test/nodes)
 	@if $(ROS)/run python -c "import ctypes; ctypes.CDLL('librmw_cyclonedds_cpp.so')" 2>/dev/null; then \
-	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-m "not evidence" test/nodes); \
+	  export RMW_IMPLEMENTATION=rmw_cyclonedds_cpp; $(call pytest_on_ros,-n 2 -m "not evidence" test/nodes); \
 	else echo "make test-ros: this ROS has no rmw_cyclonedds_cpp: the nodes were tested on Fast DDS alone"; fi
 
 test-faults: $(ROS)/ready
-	$(call pytest_on_ros,-m evidence test/nodes)
-	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,$(FAULTS_ON_ROS))
+	$(call pytest_on_ros,-n 2 -m evidence test/nodes)
+	export PYTHONPATH=$(CURDIR)/benchmarks; $(call pytest_on_ros,-n 2 $(FAULTS_ON_ROS))
 
 # Tests that need ROS are skipped without it. pytest fails where it finds no test. The cache of
 # compiled loops is this numba's own.
 pytest_on_ros = $(ROS)/run python -c "import rclpy, afm_scan_ros.msg" && \
-	  NUMBA_CACHE_DIR=$(CURDIR)/$(ROS)/numba $(ROS)/run python -m pytest -n 2 $(FILES) $(1)
+	  NUMBA_CACHE_DIR=$(CURDIR)/$(ROS)/numba $(ROS)/run python -m pytest $(FILES) $(1)
 
 test-evidence: $(VENV)/ready
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m evidence test
