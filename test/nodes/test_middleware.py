@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from attrs import frozen
 from hypothesis import given
 from hypothesis import strategies as st
 
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.middleware import (
@@ -248,3 +250,11 @@ def test_fast_dds_reads_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_limits_are_those_that_the_window_asks_for() -> None:
     """A lost block comes again within a quarter of the window of 20 blocks at 50 a second."""
     assert HEARTBEAT <= 20 / 50 / 4
+
+
+def test_an_older_node_is_found_before_a_silence_counts() -> None:
+    """Its answer to a new node's first announcement may come before that one listens."""
+    announced = ET.parse(OURS).find(".//{*}leaseAnnouncement")  # noqa: S314 - our own file
+    assert announced is not None
+    seconds, more = (float(announced.findtext(f"{{*}}{name}", "0")) for name in ("sec", "nanosec"))
+    assert 0.0 < seconds + 1e-9 * more < SafetySettings().held
