@@ -13,7 +13,6 @@ from attrs import frozen
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.middleware import (
@@ -31,6 +30,7 @@ from afm_scan_ros.nodes.middleware import (
     lacks_room,
     prepare,
 )
+from afm_scan_ros.nodes.scan_node import COMMON
 
 OURS = share_directory() / "config" / "fastdds.xml"
 XMLNS = ' xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"'
@@ -257,4 +257,5 @@ def test_an_older_node_is_found_before_a_silence_counts() -> None:
     announced = ET.parse(OURS).find(".//{*}leaseAnnouncement")  # noqa: S314 - our own file
     assert announced is not None
     seconds, more = (float(announced.findtext(f"{{*}}{name}", "0")) for name in ("sec", "nanosec"))
-    assert 0.0 < seconds + 1e-9 * more < SafetySettings().held
+    (silence,) = (each.default for each in COMMON if each.name == "liveness_timeout_s")
+    assert 0.0 < seconds + 1e-9 * more < silence

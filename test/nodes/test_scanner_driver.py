@@ -248,9 +248,7 @@ def test_a_driver_that_hangs_is_named_and_ends_in_real_time(
     words = file.read_text("utf-8").replace("options: {", "options: {call: advance, ")
     file.write_text(words, "utf-8")
     scanner = f"faulty:Hanging:{file}"
-    said = (
-        r"scanner_driver: .*(the driver has not answered for 0\.\d+ s|a call of the driver did)"
-    )
+    said = r"scanner_driver: .*(the driver has not answered for 0\.\d+ s|a call of the driver did)"
     with pytest.raises(ScanError, match=f"{said}.*; the drive may not be at rest"):
         run_calibration(DrivenScanner(scanner), tmp_path, [EXPERIMENTS["rest"].plan()])
     driver = int((tmp_path / "outputs.txt.pid").read_text("utf-8"))
