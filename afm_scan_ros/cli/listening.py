@@ -13,7 +13,7 @@ from rclpy.node import Node
 from afm_scan_ros.bag.typestore import Message
 from afm_scan_ros.cli.progress import ScanProgress, showing, working
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.nodes.peers import READY, RUNNING
+from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.run import join
 from afm_scan_ros.nodes.topics import ACHIEVED, NODE_STATE, SCAN_INFO, TRUE
 
@@ -35,8 +35,8 @@ class ScanWatch:
         self._total = info.total_samples
 
     def hear(self, state: Message) -> None:
-        """Show a node's state."""
-        if state.state == RUNNING and state.reason not in ("", self._last_reason):
+        """Show a node's state; of one that is met late, it may be the last one alone."""
+        if state.state in (RUNNING, DONE) and state.reason not in ("", self._last_reason):
             self._last_reason = state.reason
             self._shown.say(f"{state.node}: {state.reason}")
         self._slowest[state.node] = state.next_sample

@@ -20,7 +20,7 @@ from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.nodes.flow import USUAL_WINDOW
-from afm_scan_ros.nodes.peers import RUNNING
+from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.topics import BLOCKS
 from helpers.scaling import scaled_axis
 from helpers.viewers import assert_curves_are_recorded, assert_samples_are_of_the_streams
@@ -51,6 +51,18 @@ def test_the_slowest_node_says_how_far_a_scan_is(
         "a scan: trajectory_generator: running (0 s)",
         "a scan: 25%, sample 250 of 1000 (0 s)",
     ]
+
+
+@pytest.mark.parametrize("heard", [(RUNNING,), (RUNNING, DONE), (DONE,)])
+def test_an_alarm_is_told_once_also_of_a_node_that_is_met_late(
+    capsys: pytest.CaptureFixture[str], heard: tuple[str, ...]
+) -> None:
+    with showing("a scan") as shown:
+        watch = ScanWatch(shown)
+        for state in heard:
+            reported = {"node": "residual_monitor", "state": state, "reason": "an alarm"}
+            watch.hear(SimpleNamespace(next_sample=0, **reported))
+    assert capsys.readouterr().err.splitlines().count("residual_monitor: an alarm") == 1
 
 
 def test_a_scan_is_recorded_whole_and_follows_what_was_desired(spec: Path, tmp_path: Path) -> None:
