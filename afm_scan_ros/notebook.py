@@ -8,7 +8,6 @@ import io
 from base64 import b64encode
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 from bokeh.resources import Resources
 from PIL import Image
@@ -24,7 +23,6 @@ __all__ = ["BLUE", "GREY", "LIBRARY", "ORANGE", "Curve", "Map", "Panel", "progre
 
 LIBRARY = "bokeh_library"
 """Key in the metadata of the output that brings Bokeh's library, once a kernel: 1.3 MB."""
-TEMPLATES = Path(__file__).parent / "templates"
 
 
 def show(*rows: Panel | Sequence[Panel], caption: str = "", height: float = 1.0) -> None:
@@ -57,7 +55,7 @@ def html_of(picture: Picture) -> str:
     fewer = Image.open(raw).convert("RGB").quantize(128, method=Image.Quantize.FASTOCTREE)
     fewer.save(still, format="png", optimize=True)
     image = b64encode(still.getvalue()).decode()
-    return page("notebook.html", TEMPLATES, of=picture, drawn=drawn([picture]), still=image)
+    return page("notebook.html", of=picture, drawn=drawn([picture]), still=image)
 
 
 @cache

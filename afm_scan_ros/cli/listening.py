@@ -35,7 +35,7 @@ class ScanWatch:
         self._total = info.total_samples
 
     def hear(self, state: Message) -> None:
-        """Show a node's state; of one that is met late, it may be the last one alone."""
+        """Show a node's state, also where its last state is the first that is heard."""
         if state.state in (RUNNING, DONE) and state.reason not in ("", self._last_reason):
             self._last_reason = state.reason
             self._shown.say(f"{state.node}: {state.reason}")

@@ -240,9 +240,10 @@ class ScanNode(Node, ABC):
         return self.peers.standstill(own, self.scan, time.monotonic(), timeout, pause)
 
     def longest_standstill(self) -> float:
-        """Return how long (s) samples may seem to stand still.
+        """Return for how long (s) no progress of a node may be heard.
 
-        A block is output meanwhile, and what a node has finished is heard a heartbeat later.
+        A block is output meanwhile. The progress that was heard last is up to a heartbeat older
+        than its message, so that this much less is waited for the next.
         """
         if not self.settings["real_time"]:
             return float(self.settings["liveness_timeout_s"])

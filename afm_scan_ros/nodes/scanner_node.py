@@ -194,11 +194,11 @@ class ScannerNode(ManagedConsumer):
             return
         wait, self._more_may_come = 0.0 if self._more_may_come else self.safety.idle, False
         answer = self._driver.answer(wait)
-        late = time.monotonic() - self._asked
-        is_late = answer is None and late > self._longest_pause()
-        self.reason = f"the driver has not answered for {late:.2g} s" if is_late else ""
         if answer is None:
+            if (late := time.monotonic() - self._asked) > self._longest_pause():
+                self.reason = f"the driver has not answered for {late:.2g} s"
             return
+        self.reason = ""
         moved, self._moving = self._moving, []
         self._driving += time.monotonic() - self._asked
         self._move_on()

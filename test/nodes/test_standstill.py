@@ -1,13 +1,17 @@
 """Where samples stand still, every node of the scan names the one at which they do."""
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 
+import pytest
 from attrs import define, field, frozen
 from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING, Peers, Report
+from afm_scan_ros.nodes.scan_node import COMMON, ScanNode
 
 READS = {  # in the order of the data flow
     "source": (),
@@ -131,3 +135,25 @@ def test_one_that_says_nothing_is_named_for_that(given_: Faults, data: st.DataOb
 @given(faults(""), st.sampled_from(NODES))
 def test_while_samples_advance_nobody_is_named(given_: Faults, watcher: str) -> None:
     assert not any(verdicts(Chain(given_), watcher))
+
+
+def longest_standstill(progress_timeout: float, block: float, heartbeat: float) -> float:
+    settings = {"real_time": True, "time_scale": 1.0, "progress_timeout_s": progress_timeout}
+    safety = SafetySettings(heartbeat=heartbeat)
+    node = SimpleNamespace(settings=settings, safety=safety, _longest_block=block)
+    return ScanNode.longest_standstill(node)  # type: ignore[arg-type]
+
+
+@given(st.floats(0.001, 1.0), st.floats(0.01, 0.1))
+def test_a_node_stands_for_no_longer_than_is_stated(block: float, heartbeat: float) -> None:
+    """From what it finished last, of which the others hear up to a heartbeat later."""
+    (timeout,) = (each for each in COMMON if each.name == "progress_timeout_s")
+    noticed = heartbeat + longest_standstill(timeout.default, block, heartbeat)
+    assert noticed == pytest.approx(timeout.default + block)
+
+
+def test_a_node_that_works_is_heard_in_time_at_the_least_limit() -> None:
+    """Its progress is heard within a block and a heartbeat."""
+    (timeout,) = (each for each in COMMON if each.name == "progress_timeout_s")
+    heartbeat = SafetySettings().heartbeat
+    assert longest_standstill(timeout.low, 0.02, heartbeat) > 0.02 + 2.0 * heartbeat

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from afm_scan_bench.faults.injection.drive import DriveOutcome, OutputLog, record_at
+from afm_scan_bench.faults.injection.drive import DriveOutcome, OutputLog, high_drive_source
 from afm_scan_bench.faults.injection.faulty_scanner import FAULT_AT, SCANNER, SOURCE, note
 from afm_scan_bench.faults.injection.hosts import (
     ADDRESSES,
@@ -27,7 +27,7 @@ WORDS = {SOURCE: f"{SCANNER} has been silent", SCANNER: f"{SOURCE} has been sile
 
 def endanger(folder: Path) -> DriveOutcome:
     """Cut the network within one scan, and see when the outputs were at rest; needs root."""
-    source = record_at(folder)
+    source = high_drive_source(folder)
     done, log = DriveOutcome(), OutputLog(folder / "outputs.txt")
     own = {"output_log": str(log.path), "min_subscriptions": 0, "min_true_subscriptions": 0}
     commands = {

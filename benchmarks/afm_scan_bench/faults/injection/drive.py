@@ -182,8 +182,8 @@ class FaultyProcesses:
                 process.wait()
 
 
-def record_at(folder: Path) -> dict[str, object]:
-    """Return the source's parameters; the drive, of x and y opposed, is written to a file."""
+def high_drive_source(folder: Path) -> dict[str, object]:
+    """Write the drive, y opposed to x, to a file; return the parameters of its source."""
     time = PERIOD * np.arange(round((LONGEST_RECORD + 1.0) / PERIOD))
     level = np.minimum(time / RISE, 1.0) * (3.7 - 0.3 * np.cos(4.0 * np.pi * time))
     folder.mkdir(parents=True, exist_ok=True)
@@ -238,9 +238,9 @@ def watch() -> None:
 
 def endanger(folder: Path, fault: Fault) -> DriveOutcome:
     """Inject a fault into one scan, and see when the outputs were at rest."""
-    given, done = record_at(folder.with_name(f"{folder.name}_drive")), DriveOutcome()
-    with Trial(folder, **{SOURCE: given, RECORDER: RECORDED}) as trial:
-        neighbours = _start_neighbours(trial, folder, fault, given)
+    source, done = high_drive_source(folder.with_name(f"{folder.name}_drive")), DriveOutcome()
+    with Trial(folder, **{SOURCE: source, RECORDER: RECORDED}) as trial:
+        neighbours = _start_neighbours(trial, folder, fault, source)
         scanner = FaultyProcesses.start(folder, fault)
         try:
             _follow(trial, scanner, done)

@@ -114,7 +114,7 @@ class Trial:
             node.process.kill()
             node.process.join()
         self._executor.shutdown()
-        self._listener.destroy_node()  # or its participant stays, and is taken for the next one
+        self._listener.destroy_node()  # which ends its participant
         rclpy.shutdown()
 
     @property
