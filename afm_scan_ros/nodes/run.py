@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 import traceback
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
+from afm_scan_ros.nodes.ending import end_within
 from afm_scan_ros.nodes.messages import state_message
 from afm_scan_ros.nodes.peers import FAILED
 from afm_scan_ros.nodes.scan_node import ScanNode
@@ -123,10 +125,15 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     try:
         live(node, executor, caught)
     finally:
-        node.owns_process = True
+        node.closed = partial(_closed, node, name)
         executor.shutdown()
         node.destroy_node()
-    return _ended(name, node.reason, node.status)
+    return node.status
+
+
+def _closed(node: ScanNode, name: str) -> None:
+    """Say how the node ended, and see that leaving ROS changes nothing of it."""
+    end_within(node.safety.leaving, _ended(name, node.reason, node.status))
 
 
 def live(node: ScanNode, executor: SingleThreadedExecutor, caught: list[str]) -> None:

@@ -20,7 +20,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.nodes.declare import declare
 from afm_scan_ros.nodes.diagnostics import Diagnostics
-from afm_scan_ros.nodes.ending import end_within
 from afm_scan_ros.nodes.messages import Message, state_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.peers import DONE, FAILED, READY, RUNNING, Peers, Report
@@ -72,7 +71,7 @@ class ScanNode(Node, ABC):
         self.reason = "waits for scan_info"
         self.next_sample = 0
         self.status = 0
-        self.owns_process = False
+        self.closed: Callable[[], None] = lambda: None
         self.ready = False
         self._reported = 0
         self._logged = ""
@@ -357,8 +356,7 @@ class ScanNode(Node, ABC):
         if self._heartbeat.is_alive():
             self._heartbeat.join()
         self._readers.clear()
-        if self.owns_process:  # hardware and bag are closed by now
-            end_within(self.safety.leaving, self.status)
+        self.closed()  # hardware and bag are, and it remains to leave ROS
         super().destroy_node()
 
     def _log_news(self) -> None:

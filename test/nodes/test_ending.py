@@ -5,17 +5,19 @@ import sys
 
 import pytest
 
-WAITS = """
-import ctypes
+LEAVES = """
+import ctypes, os
 from afm_scan_ros.nodes.ending import end_within
 end_within(1, {status})
-ctypes.PyDLL(None).sleep(600)  # with the interpreter's lock
+{leaves}
 """
+HANGS = "ctypes.PyDLL(None).sleep(600)  # with the interpreter's lock"
 
 
 @pytest.mark.parametrize("status", [0, 1, 3])
-def test_a_process_that_waits_with_the_interpreter_locked_ends_with_its_status(status: int) -> None:
-    code = WAITS.format(status=status)
+@pytest.mark.parametrize("leaves", [HANGS, "os.abort()", "ctypes.string_at(0)"])
+def test_a_process_that_hangs_or_crashes_ends_with_its_status(status: int, leaves: str) -> None:
+    code = LEAVES.format(status=status, leaves=leaves)
     done = subprocess.run([sys.executable, "-c", code], timeout=60, check=False)
     assert done.returncode == status
 
