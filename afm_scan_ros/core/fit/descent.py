@@ -208,11 +208,12 @@ def _bent(fit: AxisFit, equations: _Equations, move: Array, lowest: Array) -> Ar
 def bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
     """Move of the free parameters, none below its lowest, that lowers ½ mᵀHm - gᵀm most.
 
-    All that would pass their bound are held there, and all held that pull away from it are let go,
-    while these become fewer; then one at a time, so that this ends.
+    Those at their bound are held there first. All that would pass it are held too, and all held
+    that pull away from it are let go, while these become fewer; then one at a time, so that this
+    ends.
     Source: J. Kim and H. Park, SIAM J. Sci. Comput. 33 (2011) 3261, section 3.
     """
-    move, loose, fewest = np.zeros(len(right)), free.copy(), len(right) + 1
+    move, loose, fewest = np.zeros(len(right)), free & (lowest < 0.0), len(right) + 1
     for _ in range(3 * len(right)):
         held = free & ~loose
         move[held] = lowest[held]

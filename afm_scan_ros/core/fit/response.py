@@ -32,13 +32,21 @@ class Response:
 
     def states(self, edges: Edges) -> States:
         """Means over stretches of what the output's derivatives hold."""
-        of_modes, of_lags, of_creep = _decays(self.dynamics, self.period)
+        _, of_lags, of_creep = _decays(self.dynamics, self.period)
         unread, given = np.zeros(len(self.inputs)), (self.settled, self.inputs, edges)
-        modes, changes = _of_modes(of_modes, self.dynamics.weights, self.period, *given, unread)
+        modes, changes = of_modes(self.dynamics, self.period, *given)
         lags = _of_lags(of_lags, np.zeros(len(of_lags)), *given, unread)
         begun = self.settled * float(self.dynamics.weights.real.sum())
         late = _of_lags(of_creep, np.zeros(len(of_creep)), begun, self.fast, edges, unread)
         return States(modes, changes, lags, late)
+
+
+def of_modes(
+    dynamics: PoleBank, period: float, settled: float, inputs: Array, edges: Edges
+) -> tuple[Complex, Complex]:
+    """Return means over stretches of the states of complex poles, and of what changes by these."""
+    decays, unread = _decays(dynamics, period)[0], np.zeros(len(inputs))
+    return _of_modes(decays, dynamics.weights, period, settled, inputs, edges, unread)
 
 
 def respond(

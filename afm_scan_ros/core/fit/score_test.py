@@ -15,10 +15,11 @@ from copy import copy
 from typing import TypeAlias
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from afm_scan_ros.core.fit.dynamics import Complex
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import Columns, Mode
 from afm_scan_ros.core.fit.sensitivity import pulled
@@ -64,7 +65,8 @@ class ScoreTest:
             wider.add((omega, damping, 0.0, 0.0))
         last = layout.parts["modes"].stop
         weights = last + (4 * np.arange(len(places))[:, np.newaxis] + [2, 3]).ravel()
-        own, shared, pull = self._products(wider, weights)
+        new = slice(layout.modes, wider.layout.modes)
+        own, shared, pull = self._products(wider.layout.dynamics(wider.theta).poles[new])
         within_wider = np.where(kept < last, kept, kept + 4 * len(places))
         precision, mean = wider.layout.prior(fit.scales, wider.theta)
         apart = precision @ (wider.theta - mean)
@@ -90,16 +92,14 @@ class ScoreTest:
             mode = omega, damping, float(pair[0]) / gain, float(pair[1]) / gain
             yield FoundMode(mode, 0.5 * float(pull[both] @ pair), gain)
 
-    def _products(self, wider: AxisFit, weights: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """H_κκ, H_θκ and b_κ of the weights at some places of a wider θ."""
-        fit, at = self.fit, weights - wider.layout.parts["lags"].start
-        own, shared = np.zeros((len(at), len(at))), np.zeros((len(self.free), len(at)))
-        pull, here = np.zeros(len(at)), fit.simulated(fit.theta)
-        linear = wider.layout.dynamics(wider.theta)
+    def _products(self, poles: Complex) -> tuple[Array, Array, Array]:
+        """H_κκ, H_θκ and b_κ of the weights of modes of some poles (rad/s), (n,)."""
+        fit, count = self.fit, 2 * len(poles)
+        own, shared = np.zeros((count, count)), np.zeros((len(self.free), count))
+        pull, here = np.zeros(count), fit.simulated(fit.theta)
         every = zip(fit.records, here, self._pieces, self._left, strict=True)
         for k, (record, simulation, pieces, left) in enumerate(every):
-            with_modes = evolve(simulation, layout=wider.layout, theta=wider.theta, dynamics=linear)
-            columns = with_modes.vibration[record.stretches][:, at]
+            columns = simulation.by_weights(poles)[record.stretches]
             columns *= fit.gain * record.weights[:, np.newaxis]
             free, variance = fit.free_of(k, gathered=True), fit.variance(record)
             alone = free.without(columns) / variance

@@ -3,13 +3,13 @@
 from functools import cached_property
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.hysteresis.preisach import terms
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.dynamics import PoleBank, States
+from afm_scan_ros.core.fit.dynamics import Complex, PoleBank, States
 from afm_scan_ros.core.fit.parameters import Layout
-from afm_scan_ros.core.fit.response import Response, respond
+from afm_scan_ros.core.fit.response import Response, of_modes, respond
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.stretch_filter import StretchFilter
 from afm_scan_ros.core.fit.stretches import averaged, means
@@ -92,10 +92,26 @@ class Simulation:
             moved = [(change * pole).real, (change * turned).real, state.real, -state.imag]
             columns.append(np.column_stack(moved))
             settled.append(np.array([0.0, 0.0, self.settled, 0.0]))
+        return self._crept(np.hstack(columns), np.concatenate(settled))
+
+    def by_weights(self, poles: Complex) -> Array:
+        """Derivatives of all stretches by the weights of modes that the model lacks.
+
+        Those by Re κ and Im κ of each pole (rad/s), (n,), stand side by side: (stretches, 2 n).
+        """
+        tried = evolve(self.dynamics, poles=poles, weights=np.zeros(len(poles), complex))
+        given = self.record.period, self.settled, self.effective, self.record.edges
+        modes, changes = of_modes(tried.read(), *given)
+        none = np.zeros((len(modes), 0))
+        seen, _, _ = tried.seen(States(modes, changes, none, none))
+        columns = np.stack([seen.real, -seen.imag], axis=2).reshape(len(seen), -1)
+        return self._crept(columns, np.tile([self.settled, 0.0], len(poles)))
+
+    def _crept(self, columns: Array, settled: Array) -> Array:
+        """What creep makes of columns (stretches, n) that had settled."""
         slow = (-1.0 / self.layout.time_constants).astype(np.complex128)
-        bank = slow, dynamics.gains.astype(np.complex128)
-        given = self.record.period, self.record.edges, np.concatenate(settled)
-        return StretchFilter(bank, 1.0, *given)(np.hstack(columns))
+        bank = slow, self.dynamics.gains.astype(np.complex128)
+        return StretchFilter(bank, 1.0, self.record.period, self.record.edges, settled)(columns)
 
     @cached_property
     def sensed(self) -> Array:

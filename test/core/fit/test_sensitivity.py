@@ -65,6 +65,22 @@ Where it is of order 2, it is delayed too.
 """
 
 
+@pytest.mark.parametrize("sensor_order", [0, 2])
+def test_the_weights_of_modes_that_lack_are_those_of_a_wider_model(
+    drive: Array, sensor_order: int
+) -> None:
+    layout, theta, _ = at_some_theta("plays", sensor_order)
+    one = evolve(signals(drive, 1e-6 * drive, 4), rested=False, unknown=None)
+    narrow, wider, more = simulate(layout, theta, one), layout, theta
+    for share in (0.6, 1.7):
+        wider, more = wider.with_mode(more, (2.0 * np.pi * share * FREQUENCY, DAMPING, 0.0, 0.0))
+    last = wider.parts["modes"].stop - wider.parts["lags"].start
+    columns = simulate(wider, more, one).vibration[:, last - 8 : last]
+    poles = wider.dynamics(more).poles[layout.modes : wider.modes]
+    expected = columns[:, [2, 3, 6, 7]]
+    np.testing.assert_allclose(narrow.by_weights(poles), expected, atol=1e-9 * abs(expected).max())
+
+
 @pytest.mark.parametrize("start", STARTS)
 @pytest.mark.parametrize(("kind", "block"), KINDS)
 def test_the_jacobian_is_the_derivative(drive: Array, kind: str, block: int, start: str) -> None:
