@@ -9,9 +9,9 @@ from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.models import Positions, model_of
 from afm_scan_ros.features.images.loops.bouc_wen import BoucWenFit, fit_bouc_wen
 from afm_scan_ros.features.images.loops.density import CellGrid
-from afm_scan_ros.features.images.loops.fit import COARSE, _still, held_out_by_density
+from afm_scan_ros.features.images.loops.fit import COARSE, held_out_by_density
 from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept, swept
-from afm_scan_ros.features.images.loops.search import NO_CREEP
+from afm_scan_ros.features.images.loops.search import NO_CREEP, at_once
 from afm_scan_ros.features.images.positions import LineDrive
 from afm_scan_ros.features.images.scan_image import ScanImage
 
@@ -51,16 +51,15 @@ def moved(size: float) -> tuple[Array, Array]:
 
 def rows(size: float) -> tuple[list[Swept], CellGrid]:
     line = LineDrive.of(image(size), 1e6, 1.0)
-    record = MovingRecord(
-        "loop", line.drive, line.moved(*moved(size)), line.sample_period, measured=line.imaged()
-    )
+    seen = line.moved(*moved(size))
+    record = MovingRecord("loop", line.drive, seen, line.sample_period, line.imaged())
     grid = CellGrid(-0.5e6 * RANGE, 0.5e6 * RANGE, COARSE)
     return list(swept([record], grid)), grid
 
 
 def fitted() -> tuple[BoucWenFit, list[Swept]]:
     found, grid = rows(RANGE)
-    dynamics = LinearDynamics(_still(found[0].record.sample_period), NO_CREEP)
+    dynamics = LinearDynamics(at_once(1.0, found[0].record.sample_period), NO_CREEP)
     return fit_bouc_wen(found, dynamics, grid.lower, grid.upper), found
 
 
@@ -68,7 +67,7 @@ def test_its_numbers_are_found_and_predict_smaller_loops() -> None:
     fit, found = fitted()
     assert np.exp(fit.numbers[0]) == pytest.approx(BETA, rel=0.05)
     assert fit.numbers[2] == pytest.approx(GAMMA / BETA, abs=0.05)
-    dynamics = LinearDynamics(_still(found[0].record.sample_period), NO_CREEP)
+    dynamics = LinearDynamics(at_once(1.0, found[0].record.sample_period), NO_CREEP)
     assert fit.held_out < held_out_by_density(found, dynamics, 1e-7)
     line, effect = LineDrive.of(image(0.5 * RANGE), 1e6, 1.0), Duhem(fit.slopes())
     predicted = line.at_pixels(effect.apply(effect.at_rest(), line.drive)[1])

@@ -6,10 +6,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import (
@@ -22,7 +20,6 @@ from afm_scan_ros.features.images.loops.density import (
     surface_of,
     swept_areas,
 )
-from afm_scan_ros.features.images.loops.fit import fit_jointly
 from afm_scan_ros.features.images.loops.moving import ROWS, MovingRecord, swept
 
 LOWER, UPPER = -1.0, 2.5
@@ -101,7 +98,10 @@ def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
     A record loses less than a row at its end and half a row where the finer rows end.
     """
     waves = [np.sin(2.0 * np.pi * np.arange(n) / period) for n, period in sizes]
-    records = [MovingRecord(str(k), w, w, SAMPLE_PERIOD) for k, w in enumerate(waves)]
+    records = [
+        MovingRecord(str(k), w, w, SAMPLE_PERIOD, np.ones(len(w), bool))
+        for k, w in enumerate(waves)
+    ]
     rows = list(swept(records, CellGrid(LOWER, UPPER, 2)))
     for record in records:
         rows_of_record = [one for one in rows if one.record.name == record.name]
@@ -113,47 +113,6 @@ def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
 LOOPS = np.interp(np.arange(600), np.linspace(0, 600, 7), [0.0, UPPER, LOWER, 0.1, 0.0, 2.0, 0.0])
 
 
-def test_the_hysteresis_state_is_known_once_both_ends_were_visited() -> None:
-    loops = MovingRecord("loops", LOOPS, LOOPS, SAMPLE_PERIOD)
-    first = loops.known_from()
-    seen = LOOPS[: first + 1]
-    assert seen.max() == pytest.approx(UPPER, abs=0.05)
-    assert seen.min() == pytest.approx(LOWER, abs=0.05)
-    assert MovingRecord("loops", LOOPS, LOOPS, 1.0, depolarised=True).known_from() == 0
-    up = MovingRecord("up", np.abs(LOOPS), LOOPS, 1.0)
-    assert up.drive[up.known_from()] == pytest.approx(UPPER, abs=0.05)
-
-
-def first_rises(gain: float) -> list[MovingRecord]:
-    """Triangles from 0 V of plays that begin depolarised, and with a creep of 0.3 s; m."""
-    records, period = [], 5e-3
-    for seed, (size, rate) in enumerate(((40.0, 1.0), (95.0, 1.0), (95.0, 5.0))):
-        turns = rate * period * np.arange(800)
-        drive = size * (1.0 - np.abs(1.0 - 2.0 * (turns % 1.0)))
-        plays, moved = np.zeros(20), []
-        for each in drive:
-            plays = np.clip(plays, *(each + side * np.linspace(0.0, 45.0, 20) for side in (-1, 1)))
-            moved.append(0.2e-6 * (0.75 * each + 0.25 * plays.mean()))
-        noise = np.random.default_rng(seed).normal(0.0, 2e-9, len(drive))
-        creep = Creep(CreepModel((gain,), (0.3,)), period)
-        moved = creep.apply(creep.at_rest(), np.array(moved))[1] + noise
-        records.append(MovingRecord(f"{size} V", drive, np.asarray(moved), period))
-    return records
-
-
-AT_ONCE = VibrationModel((1.0,), (1e-4, 1.0))
-
-
-@pytest.mark.evidence
-def test_a_first_rise_from_depolarised_rest_is_not_taken_for_creep() -> None:
-    without = fit_jointly(first_rises(0.0), AT_ONCE, None, lambda _: None)
-    assert without.creep is None
-    found = fit_jointly(first_rises(0.1), AT_ONCE, None, lambda _: None).creep
-    assert found is not None
-    assert found[0].lower is not None
-    assert found[0].lower < 1.05 * 0.1
-
-
 def test_a_record_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="drive or displacement rests"):
-        MovingRecord("still", LOOPS, np.zeros_like(LOOPS), SAMPLE_PERIOD)
+        MovingRecord("still", LOOPS, np.zeros(600), SAMPLE_PERIOD, np.ones(600, bool))

@@ -41,7 +41,7 @@ from afm_scan_ros.features.images.loops.fit import (
     held_out_by_density,
 )
 from afm_scan_ros.features.images.loops.moving import MovingRecord, swept
-from afm_scan_ros.features.images.loops.search import LAGS, NO_CREEP
+from afm_scan_ros.features.images.loops.search import NO_CREEP, at_once
 from afm_scan_ros.features.images.positions import LineDrive, rows_of
 from afm_scan_ros.features.images.scan_image import ScanImage
 
@@ -143,7 +143,7 @@ def _with_hysteresis(
     if fastest >= APART * slowest:
         joint = fit_jointly(records, None, None, progress)
     else:
-        joint = fit_jointly(records, _at_once(1.0, shortest), NO_CREEP, progress)
+        joint = fit_jointly(records, at_once(1.0, shortest), NO_CREEP, progress)
     hysteresis, vibration = _of_better_form(records, joint)
     drive = joint.grid.lower, joint.grid.upper
     known = EffectStatus(drive=drive, frequencies=rates)
@@ -224,9 +224,4 @@ def _with_gain(gain: float, reach: float, period: float) -> AxisModel:
     levels = np.linspace(-reach, reach, LEVELS)
     line = EverettSurface(-reach, reach, np.tril(0.5 * (levels[:, np.newaxis] - levels)), -reach)
     effects = BaseEffects(unknown("creep"), unknown("hysteresis"), unknown("frequency"))
-    return AxisModel(HysteresisModel(line, line), _at_once(gain, period), NO_CREEP, effects=effects)
-
-
-def _at_once(gain: float, period: float) -> VibrationModel:
-    """Vibration of a gain (m/V) that is too fast for samples of a ``period`` (s) to show."""
-    return VibrationModel((gain,), (float(LAGS[0]) * period, 1.0))
+    return AxisModel(HysteresisModel(line, line), at_once(gain, period), NO_CREEP, effects=effects)

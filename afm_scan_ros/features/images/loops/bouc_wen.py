@@ -15,7 +15,6 @@ from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
-from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
 from afm_scan_ros.core.compiled import compiled
@@ -23,6 +22,7 @@ from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.features.images.grating.motion import spline_basis
 from afm_scan_ros.features.images.loops.moving import LinearDynamics, Swept, loop_parts
 
 POWERS = 3
@@ -83,14 +83,14 @@ class BoucWenFit:
         if least <= 0.0:
             raise InputError("the motion does not grow with the drive")
         widths = self._widths()
-        inputs, outputs = _spline(knots), _spline(np.linspace(-1.0, 1.0, 8 * CELLS + 1))
-        centre = np.linalg.lstsq(inputs, slope / half, rcond=None)[0]
+        splines = spline_basis(knots, CELLS)
+        centre = np.linalg.lstsq(splines, slope / half, rcond=None)[0]
         distance = np.linspace(*widths, 8 * CELLS + 1)
         tables = []
         for way in (1.0, -1.0):
             change = self._change(way, knots, distance) / half
-            across = np.linalg.lstsq(outputs, change.T, rcond=None)[0].T
-            table = np.linalg.lstsq(inputs, across, rcond=None)[0]
+            across = np.linalg.lstsq(splines, change.T, rcond=None)[0].T
+            table = np.linalg.lstsq(splines, across, rcond=None)[0]
             tables.append(np.maximum(centre[:, np.newaxis] + table, least))
         lowest = float(np.polynomial.polynomial.polyval(-1.0, curve))
         range_, centre = (self.lower, self.upper), np.maximum(centre, least)
@@ -118,12 +118,6 @@ def _at_rest(slopes: DuhemSlopes) -> DuhemSlopes:
     fading = depolarising(slopes.lower, slopes.upper, 0.0)
     output = float(effect.apply(effect.at_rest(), fading)[1][-1])
     return evolve(slopes, offset=slopes.offset - output, rest=0.0)
-
-
-def _spline(places: Array) -> Array:
-    """Uniform cubic B-splines of ``CELLS`` cells over -1 to 1, at places (n,): (n, cells + 3)."""
-    knots = 2.0 * np.arange(-3, CELLS + 4) / CELLS - 1.0
-    return np.asarray(BSpline.design_matrix(places, knots, 3).toarray())
 
 
 def _physical(numbers: Numbers) -> Numbers:

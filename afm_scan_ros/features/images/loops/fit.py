@@ -3,40 +3,29 @@
 The smoothing of the density is chosen by how well parts of the records predict each other.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from operator import add
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
-from afm_scan_ros.features.images.loops.density import (
-    CellGrid,
-    NormalEquations,
-    solve,
-)
-from afm_scan_ros.features.images.loops.moving import (
-    LinearDynamics,
-    MovingRecord,
-    Swept,
-    centred,
-    loop_parts,
-    parts_of,
-    swept,
-)
-from afm_scan_ros.features.images.loops.ringing import Ringing, resonance
+from afm_scan_ros.features.images.loops import moving
+from afm_scan_ros.features.images.loops.density import CellGrid, NormalEquations, solve
+from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept, swept
 from afm_scan_ros.features.images.loops.ripple import rippling
 from afm_scan_ros.features.images.loops.search import (
-    LAGS,
     NO_CREEP,
     Densities,
     Form,
+    Found,
     Lag,
     OneCreep,
+    at_once,
     search,
 )
 
@@ -52,11 +41,10 @@ ALIKE = 0.1
 
 @frozen(eq=False)
 class JointFit:
-    """Weights (m) of the cells of a grid, and what follows the hysteresis.
+    """Weights (m) of the cells of a grid, under a smoothing, and what follows the hysteresis.
 
     ``vibration`` and ``creep`` hold the intervals of what was sought and identified of them; None
-    where the records do not identify it, or where it was known. ``fitted`` is the rms misfit (m) to
-    the rows fitted, ``held_out`` that of each part under a fit of the others, on the coarse grid.
+    where the records do not identify it, or where it was known.
     """
 
     weights: Array
@@ -65,18 +53,6 @@ class JointFit:
     vibration: tuple[ParameterInterval, ...] | None
     creep: tuple[ParameterInterval, ...] | None
     smoothing: float
-    fitted: float
-    held_out: float
-
-
-@frozen(eq=False)
-class _Solution:
-    """Dynamics, intervals of what the records identify, smoothing and the held-out error."""
-
-    dynamics: LinearDynamics
-    intervals: dict[type[Form], tuple[ParameterInterval, ...]]
-    smoothing: float
-    held_out: float
 
 
 def fit_jointly(
@@ -87,53 +63,29 @@ def fit_jointly(
 ) -> JointFit:
     """Fit all records; the vibration (of gain 1 at rest) and the creep are sought where None.
 
-    Where a resonance rings, no lag is sought beside it. Raises ScanError where a search does not
+    Where a resonance ripples, no lag is sought beside it. Raises ScanError where a search does not
     converge.
     """
     grids = [list(swept(records, grid_of(records, cells))) for cells in (COARSE, FINER)]
-    rings = None
+    still = at_once(1.0, min(record.sample_period for record in records))
+    ripple = None
     if vibration is None:
         progress("seeking a resonance")
-        rings = _resonance(records, grids[0])
-        vibration = None if rings is None else rings.vibration
+        ripple = rippling(grids[0], WEAK_SMOOTHING, LinearDynamics(still, NO_CREEP))
+        vibration = None if ripple is None else ripple.dynamics.vibration
     progress("seeking what follows the hysteresis")
-    solution = _sought(records, grids, vibration, creep, WEAK_SMOOTHING)
+    forms: list[Form] = [Lag(records)] if vibration is None else []
+    forms += [OneCreep(records)] if creep is None else []
+    forms, found = _sought(grids, LinearDynamics(vibration or still, creep or NO_CREEP), forms)
+    intervals = dict(zip(map(type, forms), found.intervals, strict=True))
+    folds = _folds(grids[0], found.dynamics)
+    smoothing = min(SMOOTHINGS, key=lambda choice: _crossed(folds, choice))
     progress("fitting the hysteresis")
     grid = grid_of(records, FINE)
-    found = _fitted(swept(records, grid), grid, solution)
-    if rings is None:
-        return found
-    return evolve(found, vibration=rings.intervals)
-
-
-def _resonance(records: Sequence[MovingRecord], coarse: Sequence[Swept]) -> Ringing | None:
-    """Seek decays after the turns, or ripple where the records do not show the turns."""
-    if all(record.measured is None for record in records):
-        return resonance(records)
-    still = LinearDynamics(_still(min(record.sample_period for record in records)), NO_CREEP)
-    return rippling(coarse, WEAK_SMOOTHING, still)
-
-
-def _weights(records: Iterable[Swept], solution: _Solution) -> tuple[Array, float]:
-    """Fit the density on a grid: its weights (m), and the rms of the residual (m)."""
-    each = (NormalEquations.of(*one.weighted(solution.dynamics), one.counted) for one in records)
-    whole = reduce(add, each)
-    weights = solve(whole, solution.smoothing)
-    return weights, whole.rms(weights)
-
-
-def _fitted(records: Iterable[Swept], grid: CellGrid, solution: _Solution) -> JointFit:
-    weights, residual = _weights(records, solution)
-    return JointFit(
-        weights=weights,
-        grid=grid,
-        dynamics=solution.dynamics,
-        vibration=solution.intervals.get(Lag),
-        creep=solution.intervals.get(OneCreep),
-        smoothing=solution.smoothing,
-        fitted=residual,
-        held_out=solution.held_out,
-    )
+    rows = ((*one.weighted(found.dynamics), one.counted) for one in swept(records, grid))
+    weights = solve(reduce(add, (NormalEquations.of(*each) for each in rows)), smoothing)
+    rings = intervals.get(Lag) if ripple is None else ripple.intervals[0]
+    return JointFit(weights, grid, found.dynamics, rings, intervals.get(OneCreep), smoothing)
 
 
 def grid_of(records: Sequence[MovingRecord], cells: int) -> CellGrid:
@@ -144,44 +96,20 @@ def grid_of(records: Sequence[MovingRecord], cells: int) -> CellGrid:
 
 
 def _sought(
-    records: Sequence[MovingRecord],
-    grids: Sequence[Sequence[Swept]],
-    vibration: VibrationModel | None,
-    creep: CreepModel | None,
-    smoothing: float,
-) -> _Solution:
-    """Seek what is not known by a lag and one creep, and choose the smoothing."""
-    still = _still(min(record.sample_period for record in records))
-    forms: list[Form] = [Lag(records)] if vibration is None else []
-    forms += [OneCreep(records)] if creep is None else []
-    return _solution(grids, LinearDynamics(vibration or still, creep or NO_CREEP), forms, smoothing)
+    grids: Sequence[Sequence[Swept]], known: LinearDynamics, forms: Sequence[Form]
+) -> tuple[list[Form], Found]:
+    """Search for forms grid by grid, and again without those that the records do not identify.
 
-
-def _still(period: float) -> VibrationModel:
-    """Vibration too fast for samples of a ``period`` (s) to show."""
-    return VibrationModel((1.0,), (float(LAGS[0]) * period, 1.0))
-
-
-def _solution(
-    grids: Sequence[Sequence[Swept]], known: LinearDynamics, forms: Sequence[Form], smoothing: float
-) -> _Solution:
-    """Search for forms grid by grid, and again without those that the records do not identify."""
-    found = search(Densities(grids[0], smoothing), known, forms)
+    Returns those that are left, and what was found of them.
+    """
+    found = search(Densities(grids[0], WEAK_SMOOTHING), known, forms)
     for records in grids[1:]:
         if all(found.identified):
-            found = search(Densities(records, smoothing), known, forms, found.values)
-    if not all(found.identified):
-        fewer = [form for form, seen in zip(forms, found.identified, strict=True) if seen]
-        return _solution(grids, known, fewer, smoothing)
-    chosen, held_out = _cross_validated(grids[0], found.dynamics)
-    intervals = dict(zip(map(type, forms), found.intervals, strict=True))
-    return _Solution(found.dynamics, intervals, chosen, held_out)
-
-
-def _cross_validated(records: Sequence[Swept], dynamics: LinearDynamics) -> tuple[float, float]:
-    """Smoothing under which the parts predict each other best, and how well, m rms."""
-    folds = _folds(records, dynamics)
-    return min((_crossed(folds, choice), choice) for choice in SMOOTHINGS)[::-1]
+            found = search(Densities(records, WEAK_SMOOTHING), known, forms, found.values)
+    if all(found.identified):
+        return list(forms), found
+    fewer = [form for form, seen in zip(forms, found.identified, strict=True) if seen]
+    return _sought(grids, known, fewer)
 
 
 @frozen(eq=False)
@@ -245,12 +173,11 @@ def _joined(group: Sequence[_Fold]) -> _Fold:
 
 def _pieces_of(one: Swept, dynamics: LinearDynamics) -> Iterator[_Fold]:
     areas, moved = one.regression(dynamics)
-    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)[
-        one.memory_known
-    ]
-    for part in parts_of([len(moved)]):
-        samples = one.samples[one.memory_known][part]
-        rows = centred(areas[part], moved[part], samples)
+    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)
+    drive = drive[one.measured]
+    for part in moving.parts_of([len(moved)]):
+        samples = one.samples[one.measured][part]
+        rows = moving.centred(areas[part], moved[part], samples)
         equations = NormalEquations.of(*rows, float(samples.sum()))
         yield _Fold(equations, float(drive[part].min()), float(drive[part].max()))
 
@@ -261,7 +188,7 @@ def held_out_by_density(
     """Rms (m) by which each part is missed by a density of Preisach's fitted to the others."""
     parts = [
         NormalEquations.of(each.areas, each.moved, each.samples)
-        for each in loop_parts(records, dynamics)
+        for each in moving.loop_parts(records, dynamics)
     ]
     squares = 0.0
     for k, part in enumerate(parts):

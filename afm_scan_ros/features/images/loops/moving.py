@@ -32,16 +32,16 @@ PIECES = 8
 class MovingRecord:
     """Drive (V) and displacement (m), both (n,), of a record in which the scanner moves.
 
-    ``depolarised`` is whether it begins so, at rest at zero. Where not ``measured`` (n,), the
-    displacement counts nothing; None where all of it is. Raises InputError where the drive rests.
+    Where not ``measured`` (n,), the displacement counts nothing. What is measured follows a drive
+    that has visited both of its ends, so that the memory is known, whatever it was at the start.
+    Raises InputError where the drive rests.
     """
 
     name: str
     drive: Array
     displacement: Array
     sample_period: float
-    depolarised: bool = False
-    measured: NDArray[np.bool_] | None = None
+    measured: NDArray[np.bool_]
 
     def __attrs_post_init__(self) -> None:
         if np.ptp(self.drive) == 0.0 or np.ptp(self.displacement) == 0.0:
@@ -49,32 +49,14 @@ class MovingRecord:
 
     def cut(self, samples: int) -> "MovingRecord":
         """Return the record's first samples."""
-        known = None if self.measured is None else self.measured[:samples]
-        drive, displacement = self.drive[:samples], self.displacement[:samples]
-        return evolve(self, drive=drive, displacement=displacement, measured=known)
+        signals = ("drive", "displacement", "measured")
+        return evolve(self, **{name: getattr(self, name)[:samples] for name in signals})
 
     @property
     def swings(self) -> float:
         """Swings of the drive, there and back, a second."""
         turns = _turns(self.drive, AT_TURN * float(np.ptp(self.drive)))
         return max(turns, 1) / 2.0 / (len(self.drive) * self.sample_period)
-
-    def known_from(self) -> int:
-        """First sample from which on the memory is known, whatever it was at the start.
-
-        Once both ends of the record's drive were visited, all that lies between them is written
-        anew, and what lies beyond them rests. That holds of drives of one sign too: a first rise
-        from depolarised rest is higher than those that follow.
-        """
-        if self.depolarised:
-            return 0
-        near = AT_TURN * np.ptp(self.drive)
-        ends = (
-            self.drive >= self.drive.max() - near,
-            self.drive <= self.drive.min() + near,
-        )
-        first = [int(np.argmax(end)) for end in ends]
-        return max(first)
 
 
 @frozen
@@ -89,7 +71,7 @@ class LinearDynamics:
 class Swept:
     """A record's displacement (m) and areas, averaged over ``every`` samples, (rows, …).
 
-    ``areas`` count from rest at zero. ``memory_known`` marks the rows in which the memory is known.
+    ``areas`` count from rest at zero. ``measured`` marks the rows that were measured throughout.
     A row counts for ``samples`` (rows,), of which those that another row shows too count half.
     """
 
@@ -97,7 +79,7 @@ class Swept:
     every: int
     moved: Array
     areas: Array
-    memory_known: NDArray[np.bool_]
+    measured: NDArray[np.bool_]
     samples: Array
 
     @property
@@ -106,22 +88,22 @@ class Swept:
         return self.every * self.record.sample_period
 
     def regression(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
-        """Areas behind the dynamics, and the displacement, in the rows of known memory.
+        """Areas behind the dynamics, and the displacement, in the rows that were measured.
 
         Both are without their means, as the sensor's zero is arbitrary.
         """
         areas = _creeping(self._vibrating(dynamics.vibration), dynamics.creep, self.row_period)
-        areas, moved = areas[self.memory_known], self.moved[self.memory_known]
+        areas, moved = areas[self.measured], self.moved[self.measured]
         return areas - areas.mean(axis=0), moved - moved.mean()
 
     def weighted(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
         """The same with each row times the root of its samples, so that squares count samples."""
-        return centred(*self.regression(dynamics), self.samples[self.memory_known])
+        return centred(*self.regression(dynamics), self.samples[self.measured])
 
     @property
     def counted(self) -> float:
-        """Samples of all rows of known memory."""
-        return float(self.samples[self.memory_known].sum())
+        """Samples of all rows that were measured."""
+        return float(self.samples[self.measured].sum())
 
     def shared_until(self, last: int) -> "Swept":
         """The same, where other rows show the samples before ``last`` too: each counts half."""
@@ -179,10 +161,8 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
         whole = _swept(record, grid, every)
         if (finer := max(1, int(per_swing / RINGING))) < every:
             begin = record.drive[: ROWS // len(records) * finer]
-            if (
-                np.ptp(begin) > 0.0
-                and (part := _swept(record.cut(len(begin)), grid, finer)).memory_known.any()
-            ):
+            part = _swept(record.cut(len(begin)), grid, finer)
+            if part.measured.any():
                 yield whole.shared_until(len(begin))
                 yield part.shared_until(len(begin))
                 continue
@@ -190,18 +170,14 @@ def swept(records: Sequence[MovingRecord], grid: CellGrid) -> Iterator[Swept]:
 
 
 def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
-    first = record.known_from()
     record = record.cut(ROWS * every)
     before = depolarising(grid.lower, grid.upper, 0.0)
     areas = swept_areas(record.drive, grid, before, every)
     rest = swept_areas(np.zeros(1), grid, before)[0]
     moved = record.displacement[: len(areas) * every].reshape(-1, every).mean(axis=1)
-    memory_known = np.arange(len(areas)) * every >= first
-    if record.measured is not None:
-        memory_known &= record.measured[: len(areas) * every].reshape(-1, every).all(axis=1)
-    return Swept(
-        record, every, moved, areas - rest, memory_known, np.full(len(moved), float(every))
-    )
+    measured = np.all(record.measured[: len(areas) * every].reshape(-1, every), axis=1)
+    samples = np.full(len(moved), float(every))
+    return Swept(record, every, moved, areas - rest, measured, samples)
 
 
 def parts_of(lengths: Sequence[int]) -> list[slice]:
@@ -232,7 +208,7 @@ def loop_parts(records: Sequence[Swept], dynamics: LinearDynamics) -> list[LoopP
     groups: dict[tuple[float, int], list[LoopPart]] = {}
     for one in records:
         areas, moved = one.regression(dynamics)
-        samples = one.samples[one.memory_known]
+        samples = one.samples[one.measured]
         for number, part in enumerate(parts_of([len(moved)])):
             found = LoopPart(
                 *centred(areas[part], moved[part], samples[part]), float(samples[part].sum())

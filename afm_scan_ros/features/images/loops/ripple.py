@@ -1,6 +1,6 @@
 """A resonance sought by its ripple in all that moves, in the fit of the hysteresis itself.
 
-Decays after the turns need a record without gaps. This needs none: images show no turns.
+No free decay is asked for: images show no turns.
 """
 
 from collections.abc import Sequence
@@ -9,17 +9,17 @@ import numpy as np
 from attrs import evolve
 from scipy.signal import argrelmin
 
+from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept
-from afm_scan_ros.features.images.loops.ringing import RESONANT, Ringing, mode_intervals, mode_of
-from afm_scan_ros.features.images.loops.search import Densities, Form, Found, search
+from afm_scan_ros.features.images.loops.search import Densities, Form, Found, of_logarithm, search
 
 RATIO = 1.06
 """Ratio of neighbouring frequencies that are tried."""
 BEST = 3
 """Frequencies tried from which a search begins."""
-DAMPINGS = np.log([1e-3, 0.02, RESONANT])
+DAMPINGS = np.log([1e-3, 0.02, 0.5])
 """Least, first and greatest logarithm of the damping ratio."""
 CYCLES = 3.0
 """Fewest cycles in a swing, as a loop bends less often."""
@@ -37,19 +37,25 @@ class ResonanceForm(Form):
 
     def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
         """Put the resonance in the vibration's place."""
-        return evolve(dynamics, vibration=mode_of(values))
+        omega, zeta = (float(each) for each in np.exp(values))
+        mode = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
+        return evolve(dynamics, vibration=mode)
 
     def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
         """Intervals of frequency (Hz) and damping (1)."""
-        return mode_intervals(values, half)
+        hertz = float(values[0] - np.log(2.0 * np.pi))
+        return (
+            of_logarithm("resonance", hertz, half[0], "Hz"),
+            of_logarithm("damping", values[1], half[1], "1"),
+        )
 
     def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
         """Whether the frequency is known as finely as it was tried."""
         return bool(half[0] < np.log(RATIO))
 
 
-def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) -> Ringing | None:
-    """Resonance of gain 1 at rest and its intervals; None where the records do not identify it.
+def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) -> Found | None:
+    """Resonance of gain 1 at rest; None where the records do not identify it.
 
     Raises ScanError where a search does not converge.
     """
@@ -58,16 +64,8 @@ def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) ->
     misses = np.array([_missed(evidence, known, float(hertz)) for hertz in tried])
     places = sorted(argrelmin(misses, mode="clip")[0], key=lambda place: misses[place])[:BEST]
     found = [search(evidence, known, [ResonanceForm(float(tried[place]))]) for place in places]
-    seen = [each for each in found if all(each.identified)]
-    if not seen:
-        return None
-    best = min(seen, key=_square)
-    hertz = float(np.exp(best.values[0]) / (2.0 * np.pi))
-    return Ringing(best.dynamics.vibration, hertz, best.intervals[0])
-
-
-def _square(found: Found) -> float:
-    return float(found.residual @ found.residual)
+    seen = (each for each in found if all(each.identified))
+    return min(seen, key=lambda each: float(each.residual @ each.residual), default=None)
 
 
 def _tried(records: Sequence[MovingRecord], row_period: float) -> Array:

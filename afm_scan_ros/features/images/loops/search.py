@@ -9,11 +9,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
 from operator import add
-from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -38,12 +36,16 @@ GAINS = np.array([0.0, 0.02, 0.5])
 CREEPS = np.array([0.01, 0.2, 1.0])
 """Least, first and greatest time constant of the creep, in lengths of the longest record."""
 LEVEL = 0.975
-Rows: TypeAlias = slice | NDArray[np.int64]
 QUADRATIC = 3.0
 """Difference of two grids over the error of the finer one, of half the width."""
 FARTHEST = np.log(1e3)
 """Logarithm of the factor from which on an interval counts as open."""
 NO_CREEP = CreepModel((), ())
+
+
+def at_once(gain: float, period: float) -> VibrationModel:
+    """Vibration of a gain that is too fast for samples of a ``period`` (s) to show."""
+    return VibrationModel((gain,), (float(LAGS[0]) * period, 1.0))
 
 
 class Form(ABC):
@@ -144,7 +146,7 @@ class Densities:
 
     def pieces(self) -> Sequence[slice]:
         """Parts of each record, counted through all."""
-        return parts_of([int(np.count_nonzero(one.memory_known)) for one in self.records])
+        return parts_of([int(np.count_nonzero(one.measured)) for one in self.records])
 
 
 def search(
@@ -173,7 +175,7 @@ def search(
     first = first if coarser is None else coarser
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
     best = require_converged(found, "vibration and creep of records")
-    half = jackknife(evidence.pieces(), found.jac, found.fun)
+    half = _jackknife(evidence.pieces(), found.jac, found.fun)
     if coarser is not None:
         half = half + np.abs(best - coarser) / QUADRATIC
     reach = np.where(found.active_mask == 0, half, np.inf)  # at a bound the best may lie beyond
@@ -206,7 +208,7 @@ def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
     return np.split(values, np.cumsum([form.bounds.shape[1] for form in forms])[:-1])
 
 
-def jackknife(groups: Sequence[Rows], jacobian: Array, residual: Array) -> Array:
+def _jackknife(groups: Sequence[slice], jacobian: Array, residual: Array) -> Array:
     """Half-widths of 95 % intervals, (p,), by a residual (n,) and its jacobian (n, p).
 
     The jackknife that leaves out a group at a time, linearised (J. G. MacKinnon, M. Ø. Nielsen and
