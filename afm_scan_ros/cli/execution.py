@@ -11,7 +11,6 @@ from attrs import evolve
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.progress import showing
 from afm_scan_ros.cli.scanner import SIM_NODE, ScannerChoice
-from afm_scan_ros.cli.views import viewed
 from afm_scan_ros.core.identification.drives.excitation import excitation_block
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
@@ -95,7 +94,10 @@ def _scan(order: orders.ScanOrder) -> None:
         monitor=monitor,
         **_flowing(info, flow),
     )
-    with showing(f"scan to {files.bag}") as shown, viewed(order.views, info, shown) as viewers:
+    with (
+        showing(f"scan to {files.bag}") as shown,
+        orders.viewed(order.views, info, shown) as viewers,
+    ):
         run(chain, files.bag, viewers[-1] if viewers else shown, viewers)
 
 

@@ -1,18 +1,23 @@
 """What a scan or a record is made of, however it is run: by nodes, or in this process."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from attrs import field, frozen
 
+from afm_scan_ros import features
+from afm_scan_ros.bag.live import ScanListener
 from afm_scan_ros.cli.options import CONFIG
 from afm_scan_ros.cli.scanner import SIM, ScannerChoice
+from afm_scan_ros.cli.viewing import ScanView, ViewingListener
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.plant_file import node_parameters
@@ -93,3 +98,20 @@ def parameters_of(part: str) -> dict[str, Any]:
     """Return the parameters that this file sets."""
     path = file_of(part)
     return node_parameters(yaml.load(path), str(path), part)
+
+
+VIEWS: Mapping[str, ScanView] = features.views()
+"""The viewers that features open beside a scan, by the names of their options."""
+
+
+@contextmanager
+def viewed(
+    views: Mapping[str, str], info: ScanInfo, listener: ScanListener
+) -> Iterator[Sequence[ViewingListener]]:
+    """Show a scan of this process where each viewer of a name is told to; the last hears first."""
+    found: list[ViewingListener] = []
+    with ExitStack() as open_views:
+        for name, where in views.items():
+            view = VIEWS[name].beside_pipeline(where, info, found[-1] if found else listener)
+            found.append(open_views.enter_context(view))
+        yield found

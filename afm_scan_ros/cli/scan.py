@@ -8,17 +8,9 @@ from typing import Any
 
 import click
 
+from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.execution import execute_scan
 from afm_scan_ros.cli.options import BAG, CONFIG, FILE, refuse_existing
-from afm_scan_ros.cli.orders import (
-    COMPENSATOR,
-    MONITOR,
-    Parameters,
-    ScanFiles,
-    ScanOrder,
-    parameters_of,
-    refuse_pace,
-)
 from afm_scan_ros.cli.processes import set_aside
 from afm_scan_ros.cli.scanner import (
     FILES,
@@ -31,7 +23,6 @@ from afm_scan_ros.cli.scanner import (
     scanner_options,
     time_scale_option,
 )
-from afm_scan_ros.cli.views import VIEWS
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
@@ -47,10 +38,10 @@ from afm_scan_ros.nodes.parameters import checked, inverses_of
 
 
 def run_scan(
-    files: ScanFiles,
+    files: orders.ScanFiles,
     inverses: tuple[str, ...],
     time_scale: float | None = None,
-    further: Mapping[str, Parameters] = MappingProxyType({}),
+    further: Mapping[str, orders.Parameters] = MappingProxyType({}),
     *,
     images: bool = False,
     watched: bool = False,
@@ -71,7 +62,7 @@ def run_scan(
     if time_scale is None:
         given = {"time_scale": pace_of(files.scanner), **flow}
         time_scale = float(checked(TIME_SCALE, given, str(files.spec)))
-    refuse_pace(time_scale)
+    orders.refuse_pace(time_scale)
     online = {**dict.fromkeys(ONLINE, False), **online}
     wanted = [name for name, chosen in online.items() if chosen]
     _refuse_unsuited(spec, files.scanner, wanted, views)
@@ -82,7 +73,7 @@ def run_scan(
     scanner = choose(files.scanner, files.plant)
     own = _own(files, scanner, online)
     every = {part: {**own.get(part, {}), **further.get(part, {})} for part in {*own, *further}}
-    order = ScanOrder(
+    order = orders.ScanOrder(
         files, spec, flow, model, inverses, scanner, time_scale, every, images, watched, views
     )
     try:
@@ -96,7 +87,7 @@ def _refuse_unsuited(
 ) -> None:
     """Raise InputError for a scan that cannot be corrected, or shown, as it goes on."""
     for name, where in views.items():
-        VIEWS[name].refuse(where)
+        orders.VIEWS[name].refuse(where)
     for name in online:
         ONLINE[name].refuse_unsuited(spec)
     if scanner.partition(":")[0] != FILES:
@@ -126,22 +117,22 @@ def _correction(
 
 
 def _own(
-    files: ScanFiles,
+    files: orders.ScanFiles,
     scanner: ScannerChoice,
     online: Mapping[str, bool],
-) -> dict[str, Parameters]:
+) -> dict[str, orders.Parameters]:
     """Parameters of the compensator and the monitor, before those of their files."""
     learned = {"learned_file": str(files.learned)} if files.learned else {}
     own = {**learned, **online, **_tighter_limits(scanner)}
     tracked = {name: online[name] for name, each in ONLINE.items() if each.tracker}
-    return {COMPENSATOR: own, MONITOR: tracked}
+    return {orders.COMPENSATOR: own, orders.MONITOR: tracked}
 
 
-def _tighter_limits(scanner: ScannerChoice) -> Parameters:
+def _tighter_limits(scanner: ScannerChoice) -> orders.Parameters:
     """Limits of the scanner below the compensator's, to refuse a scan before it moves."""
     if (limits := scanner.limits) is None:
         return {}
-    own = parameters_of(COMPENSATOR)
+    own = orders.parameters_of(orders.COMPENSATOR)
     theirs = {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
     return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
 
@@ -151,7 +142,7 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
 
     Those of an external scanner are not known.
     """
-    own = parameters_of(COMPENSATOR)
+    own = orders.parameters_of(orders.COMPENSATOR)
     voltage, slew = float(own["voltage_limit_v"]), float(own["slew_limit_v_per_s"])
     if (amplifier := amplifier_of(scanner, plant)) is None:
         return DriveLimits(voltage, slew)
@@ -160,7 +151,7 @@ def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
 
 def _options_of_features(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of features to a command: a flag each, and where each viewer shows it."""
-    for name, view in reversed([*VIEWS.items()]):
+    for name, view in reversed([*orders.VIEWS.items()]):
         command = click.option(
             f"--{name}", is_flag=False, flag_value=view.usual, metavar="[FILE]", help=view.help
         )(command)
@@ -202,13 +193,13 @@ def scan(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
 ) -> None:
     """Make one scan and record it."""
     run_scan(
-        ScanFiles(spec, model, plant, bag, scanner, learned),
+        orders.ScanFiles(spec, model, plant, bag, scanner, learned),
         tuple(name.strip() for name in inverses.split(",")),
         time_scale,
         {},
         images=True,
         watched=watched,
-        views={name: of_features[name] for name in VIEWS if of_features[name]},
+        views={name: of_features[name] for name in orders.VIEWS if of_features[name]},
         **{name: of_features[name] for name in ONLINE},
     )
     click.echo(f"Recorded {bag}.")

@@ -1,17 +1,36 @@
-"""The fit report as a page: what was fitted on what, and how well."""
+"""The fit report as a page: what was fitted on what, how well, and pictures of it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import cycle
 from pathlib import Path
 
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis
+import numpy as np
+
+from afm_scan_ros.core.effects.vibration import held
+from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
 from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.local_response import Complex
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.model import ModelDiscrepancy
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
-from afm_scan_ros.report.fit_pictures import fit_picture
 from afm_scan_ros.report.fit_summary import finding_text
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
-from afm_scan_ros.report.picture import MILLI, NANO
+from afm_scan_ros.report.picture import (
+    BLUE,
+    DARK_GREY,
+    LIGHT_BLUE,
+    LIGHT_ORANGE,
+    MICRO,
+    MILLI,
+    NANO,
+    ORANGE,
+    Curve,
+    Mark,
+    Panel,
+    Picture,
+    Steps,
+)
 from afm_scan_ros.report.table import Rows
 
 KNOWN = ("", "known, and where it holds", "95 % intervals")
@@ -116,3 +135,113 @@ def _by_band(known: ModelDiscrepancy) -> Iterator[tuple[str, ...]]:
     for (low, high), (rms, noise, moved) in zip(bands, values, strict=True):
         share = f"{100 * rms / moved:.2f} %" if moved else "no motion"
         yield f"{low:g} to {high:g}", f"{NANO * rms:.2f}", f"{NANO * noise:.2f}", share
+
+
+COLOURS = (LIGHT_BLUE, LIGHT_ORANGE, DARK_GREY)
+"""Of records, in turn."""
+COHERENCE = 0.9
+"""Least coherence of a measured line that is drawn."""
+POINTS = 400
+"""Points of a model's curve."""
+HALF_TURN = 180.0
+"""Degrees from one point to the next at which a curve of the phase is cut."""
+HERTZ = "frequency in Hz"
+
+
+def _coloured(found: FittedAxis) -> Iterator[tuple[FittedRecord, str]]:
+    return zip(found.records, cycle(COLOURS), strict=False)
+
+
+def _response(model: AxisModel, frequency: Array, sample_period: float) -> Complex:
+    """Complex response (m/V) from F to what the sensor reads, creep included, at Hz."""
+    omega = 2.0 * np.pi * frequency
+    gains, constants = np.array(model.creep.gains), np.array(model.creep.time_constants)
+    creep = 1.0 + np.sum(gains / (1.0 + 1j * omega[:, np.newaxis] * constants), axis=1)
+    return np.asarray(creep * held(model.read_vibration, sample_period).response(omega))
+
+
+def _magnitude(name: str, found: FittedAxis) -> Panel:
+    marks = _responses(found, lambda response: MICRO * np.abs(response))
+    return Panel(marks, HERTZ, "response to F in µm/V", f"{name}: magnitude", "xy")
+
+
+def _phase(name: str, found: FittedAxis) -> Panel:
+    marks = _responses(found, lambda response: np.degrees(np.angle(response)))
+    return Panel(marks, HERTZ, "phase in degrees", f"{name}: phase", "x")
+
+
+def _responses(found: FittedAxis, of: Callable[[Complex], Array]) -> list[Mark]:
+    """Return a figure ``of`` the responses of all records, and of the model over their band."""
+    marks: list[Mark] = []
+    for record, colour in _coloured(found):
+        measured = record.response
+        clear = measured.coherence > COHERENCE
+        seen = of(measured.response[clear])
+        marks.append(Curve(measured.frequency[clear], seen, record.name, colour, dots=True))
+    shortest = min(found.records, key=lambda record: record.sample_period)
+    highest = 0.5 / shortest.sample_period
+    lowest = min(float(r.response.frequency.min(initial=highest)) for r in found.records)
+    frequency = np.geomspace(min(lowest, 0.01 * highest), highest, POINTS)
+    curve = of(_response(found.model, frequency, shortest.sample_period))
+    turned = np.abs(np.diff(curve, prepend=curve[0])) > HALF_TURN
+    return [*marks, Curve(frequency, np.where(turned, np.nan, curve), "model", BLUE)]
+
+
+def _creep(name: str, found: FittedAxis) -> Panel:
+    creep = found.model.creep
+    held_for = np.geomspace(1e-4, 3.0, POINTS) * max(creep.time_constants, default=1.0)
+    grown = -np.expm1(-held_for[:, np.newaxis] / np.array(creep.time_constants))
+    curve = Curve(held_for, 100.0 * grown @ np.array(creep.gains))
+    label = "creep in % of the step"
+    return Panel([curve], "time since a step in s", label, f"{name}: creep after a step", "x")
+
+
+def _loops(name: str, found: FittedAxis) -> Panel:
+    curves = [
+        Curve(record.drive, record.effective, record.name, colour, width=0.6)
+        for record, colour in _coloured(found)
+    ]
+    return Panel(curves, "drive u in V", "effective input F in V", f"{name}: loops")
+
+
+def _left(name: str, found: FittedAxis) -> Panel:
+    curves = [
+        Curve(record.seconds / record.seconds[-1], NANO * record.left, record.name, colour)
+        for record, colour in _coloured(found)
+    ]
+    for one in found.validations:
+        share = np.linspace(0.0, 1.0, len(one.residual))
+        curves.append(Curve(share, NANO * one.residual, f"{one.record}, held out", ORANGE))
+    label = "measured less model in nm"
+    return Panel(curves, "time over the record's length", label, f"{name}: left of each record")
+
+
+def _bands(name: str, found: FittedAxis) -> Panel:
+    known = found.model.model_discrepancies[0]
+    lines = {
+        "motion": (known.displacement, ORANGE),
+        "left by the model": (known.rms, BLUE),
+        "sensor noise": (known.noise, DARK_GREY),
+    }
+    edges, steps = np.maximum(known.bands, known.bands[1] / 10.0), []
+    for label, (rms, colour) in lines.items():
+        shown = NANO * np.where(np.array(rms) >= min(known.noise), rms, np.nan)
+        steps.append(Steps(edges, shown, label, colour))
+    which = "fitted" if known.fitted else "held out"
+    return Panel(steps, HERTZ, "rms in nm", f"{name}: {which}, rms by band", "xy")
+
+
+CAPTIONS = {
+    "fit": "Left: rms by band of the motion of a record, if there is one that was not fitted, and"
+    " of what the model leaves of it. Right: what the model leaves of each record.",
+    "response": "Response of the displacement to F = H(u), creep and the converter's hold included:"
+    " by local fits to each record, and of the model.",
+    "slow": "Creep of the model after a step, and the loops F = H(u) of the records.",
+}
+PANELS = {"fit": (_bands, _left), "response": (_magnitude, _phase), "slow": (_creep, _loops)}
+
+
+def fit_picture(found: Identification, name: str) -> Picture:
+    """Return the picture of a name among ``PANELS``, with a row for each axis."""
+    rows = [[draw(axis, of) for draw in PANELS[name]] for axis, of in found.axes.items()]
+    return Picture(name, CAPTIONS[name], rows)

@@ -24,7 +24,6 @@ from bokeh.plotting import figure
 from bokeh.resources import Resources
 from markupsafe import Markup
 
-from afm_scan_ros.report.drawing_settings import DRAWING
 from afm_scan_ros.report.picture import (
     DARK_GREY,
     GREY,
@@ -39,7 +38,7 @@ from afm_scan_ros.report.picture import (
     Steps,
     Stretches,
 )
-from afm_scan_ros.report.reduction import coarse, thinned
+from afm_scan_ros.report.reduction import DRAWING, coarse, thinned
 
 TOOLS = "auto_box_zoom,pan,wheel_zoom,zoom_in,zoom_out,reset,save"
 SIDES: Any = ("right", "left")

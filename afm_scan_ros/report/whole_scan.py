@@ -14,7 +14,6 @@ from afm_scan_ros.core.streams import within
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.analysis import scan_spec
-from afm_scan_ros.report.drawing_settings import DRAWING
 from afm_scan_ros.report.picture import (
     BLUE,
     MICRO,
@@ -27,7 +26,7 @@ from afm_scan_ros.report.picture import (
     image_row,
     picked_lines,
 )
-from afm_scan_ros.report.reduction import extremes, thinned
+from afm_scan_ros.report.reduction import DRAWING, extremes, thinned
 from afm_scan_ros.report.scan_pictures import LOW, WAYS, topics_shown
 
 TIME = "time in s"

@@ -2,6 +2,6 @@
 
 COMMANDS = {"adapt": "Accept into the model what changed in the scanner during a scan."}
 ONLINE = {
-    "line_feedback": "afm_scan_ros.features.online.options:LINE_FEEDBACK",
-    "adapt": "afm_scan_ros.features.online.options:ADAPT",
+    "line_feedback": "afm_scan_ros.features.online.line_feedback:LINE_FEEDBACK",
+    "adapt": "afm_scan_ros.features.online.adapted_scan:ADAPT",
 }

@@ -1,5 +1,7 @@
 """The reference of a scan adapted to what earlier lines have shown to have changed."""
 
+from functools import partial
+
 import numpy as np
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
@@ -8,13 +10,14 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, Aligner
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.features.online.adaptation import Adaptation
+from afm_scan_ros.features.online.adaptation import TIME_CONSTANT, Adaptation
 from afm_scan_ros.features.online.adapted_reference import AxisShift, ReferenceFilter
 from afm_scan_ros.features.online.line_correction import (
     LineCorrection,
     lines_of_delay,
     refuse_unsuited,
 )
+from afm_scan_ros.nodes.parameters import NodeParameter, OnlineOption
 
 
 class AdaptedScan(LineCorrection):
@@ -70,3 +73,21 @@ def adapted_scan(
     """Return the adaptation of a scan, with a memory in s; raises InputError where it has none."""
     adaptation = Adaptation(model, spec, time_constant)
     return AdaptedScan(model, spec, adaptation, lines_of_delay(spec, held_back, latency))
+
+
+ADAPT = OnlineOption(
+    help="Track changes of gain, resonance and slow creep, and scan accordingly.",
+    parameters=(
+        NodeParameter(
+            "adapt",
+            default=False,
+            description="Whether changes of gain, resonance and slow creep are tracked",
+        ),
+        NodeParameter(
+            "adapt_time_constant_s", TIME_CONSTANT, "With adapt: memory of the estimator", low=0.0
+        ),
+    ),
+    refuse_unsuited=partial(refuse_unsuited, "adaptation"),
+    correction=lambda given: partial(adapted_scan, given["adapt_time_constant_s"]),
+    tracker=lambda model, spec, given: Adaptation(model, spec, given["adapt_time_constant_s"]).news,
+)

@@ -13,6 +13,7 @@ negative. So what line k - delay showed, less what was corrected since, changes 
 """
 
 from collections import deque
+from functools import partial
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from afm_scan_ros.features.online.line_correction import (
     lines_of_delay,
     refuse_unsuited,
 )
+from afm_scan_ros.nodes.parameters import NodeParameter, OnlineOption
 
 OFFSET_X, TILT_X, GAIN_X, OFFSET_Y, TILT_Y = range(5)
 """Places of the coefficients, m."""
@@ -131,3 +133,17 @@ def _paths(correction: Array, time: Array, shape: Array) -> tuple[Array, Array]:
     """Corrections (m) of x and y at times in lines from a line's start; ``shape`` is x / range."""
     x = correction[OFFSET_X] + correction[TILT_X] * (time - CENTRE_X) + correction[GAIN_X] * shape
     return x, correction[OFFSET_Y] + correction[TILT_Y] * (time - CENTRE_Y)
+
+
+LINE_FEEDBACK = OnlineOption(
+    help="Correct offset, tilt and gain of each line from the lines before it.",
+    parameters=(
+        NodeParameter(
+            "line_feedback",
+            default=False,
+            description="Whether offset, tilt and gain are corrected from the last lines",
+        ),
+    ),
+    refuse_unsuited=partial(refuse_unsuited, "line feedback"),
+    correction=lambda _: fed_back,
+)

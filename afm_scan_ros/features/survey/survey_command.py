@@ -16,8 +16,14 @@ from afm_scan_ros.cli.options import FIGURES, FOLDER, RECORD, grouped, positive
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Step
-from afm_scan_ros.features.survey.assignment import Assignment, model_digest, survey_bag
-from afm_scan_ros.features.survey.bags import FoundBag, found_bags, instrument_of
+from afm_scan_ros.features.survey.assignment import (
+    Assignment,
+    FoundBag,
+    found_bags,
+    instrument_of,
+    model_digest,
+    survey_bag,
+)
 from afm_scan_ros.features.survey.changes import changes
 from afm_scan_ros.features.survey.folder import TABLE, SurveyFolder, require_parquet
 from afm_scan_ros.features.survey.page import PLACE, Survey, alert, summary, survey_report

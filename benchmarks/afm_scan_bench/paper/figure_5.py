@@ -13,7 +13,7 @@ from afm_scan_ros.core.identification.local_response import FrequencyResponse, l
 from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.fit_pictures import COHERENCE
+from afm_scan_ros.report.fit_page import COHERENCE
 from afm_scan_ros.report.picture import BLUE, LIGHT_BLUE
 from afm_scan_ros.report.style import styled
 

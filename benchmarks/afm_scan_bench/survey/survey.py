@@ -12,8 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from afm_scan_bench.survey.fleet import NIGHT, START, Instrument, drawn_fleet, write_fleet
-from afm_scan_ros.features.survey.assignment import survey_bag
-from afm_scan_ros.features.survey.bags import found_bags
+from afm_scan_ros.features.survey.assignment import found_bags, survey_bag
 from afm_scan_ros.features.survey.changes import Change
 from afm_scan_ros.features.survey.folder import SurveyFolder
 from afm_scan_ros.features.survey.page import Survey

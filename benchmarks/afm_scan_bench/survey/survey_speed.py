@@ -21,8 +21,12 @@ from afm_scan_bench.survey.fleet import NIGHT, START
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.trajectory import total_samples
-from afm_scan_ros.features.survey.assignment import Assignment, survey_bag
-from afm_scan_ros.features.survey.bags import FoundBag, found_bags
+from afm_scan_ros.features.survey.assignment import (
+    Assignment,
+    FoundBag,
+    found_bags,
+    survey_bag,
+)
 from afm_scan_ros.features.survey.folder import SurveyFolder
 from afm_scan_ros.features.survey.recording import Recording
 from afm_scan_ros.features.survey.survey_command import FALSE_ALARM, Surveyor

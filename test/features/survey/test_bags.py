@@ -10,7 +10,7 @@ import yaml
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_info import ScanInfo
-from afm_scan_ros.features.survey.bags import found_bags, instrument_of
+from afm_scan_ros.features.survey.assignment import found_bags, instrument_of
 
 INFO = ScanInfo("one", 0, "creep", 1e-3, 10)
 
