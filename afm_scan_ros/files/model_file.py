@@ -43,22 +43,11 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
+from afm_scan_ros.files import effect_records as base
 from afm_scan_ros.files import yaml
 from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.effect_records import (
-    Arrays,
-    CreepRecord,
-    HysteresisRecord,
-    SensorRecord,
-    VibrationRecord,
-    hysteresis_from,
-    hysteresis_to,
-    vibration_from,
-    vibration_to,
-)
 from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, refuse_unknown, to_mapping
-from afm_scan_ros.files.spread_file import SpreadRecord, spread_from, spread_to
 
 ROOM = 0.01
 """Share of a bound by which a value may exceed it: another identification has another scale."""
@@ -164,15 +153,15 @@ class _Effects:
 
 @frozen
 class _Axis:
-    hysteresis: HysteresisRecord
-    vibration: VibrationRecord
-    creep: CreepRecord
+    hysteresis: base.HysteresisRecord
+    vibration: base.VibrationRecord
+    creep: base.CreepRecord
     model_discrepancy: _ModelDiscrepancy | None = None
     added: tuple[AddedEffect, ...] = ()
     known_elsewhere: tuple[_ModelDiscrepancy, ...] = ()
     effects: _Effects | None = None
-    sensor: SensorRecord | None = None
-    spread: SpreadRecord | None = None
+    sensor: base.SensorRecord | None = None
+    spread: base.SpreadRecord | None = None
 
 
 @frozen
@@ -214,7 +203,7 @@ def _apart(model: ScannerModel) -> ScannerModel:
 
 def save_model(path: Path, model: ScannerModel, heading: str) -> None:
     """Write the model and, beside it, its arrays in ``path`` with the ending ``.npz``."""
-    arrays: Arrays = {}
+    arrays: base.Arrays = {}
     axes = {name: _axis_to(model.axis(name), name, arrays) for name in model.axes}
     with saved_arrays(path, arrays) as (beside, digest):
         content = _File(
@@ -249,14 +238,14 @@ def _in_bytes(value: Any) -> Iterator[bytes]:  # noqa: ANN401 - a record or numb
 
 def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
     with naming("hysteresis"):
-        hysteresis = hysteresis_from(axis.hysteresis, arrays)
+        hysteresis = base.hysteresis_from(axis.hysteresis, arrays)
     known, given, apart = axis.model_discrepancy, axis.effects, axis.spread
     with naming("spread"):
-        spread = None if apart is None else spread_from(apart, sensitivity, arrays)
+        spread = None if apart is None else base.spread_from(apart, sensitivity, arrays)
     parts = () if given is None else (given.creep, given.hysteresis, given.vibration)
     model = AxisModel(
         hysteresis,
-        vibration_from(axis.vibration, sensitivity),
+        base.vibration_from(axis.vibration, sensitivity),
         recast(CreepModel, axis.creep),
         None if known is None else recast(ModelDiscrepancy, known),
         (),
@@ -270,16 +259,16 @@ def _axis_from(axis: _Axis, sensitivity: float, arrays: Archive) -> AxisModel:
     return model
 
 
-def _axis_to(axis: AxisModel, name: str, arrays: Arrays) -> _Axis:
+def _axis_to(axis: AxisModel, name: str, arrays: base.Arrays) -> _Axis:
     known = axis.model_discrepancy
     return _Axis(
-        hysteresis_to(axis.hysteresis, name, arrays),
-        vibration_to(axis.vibration),
-        recast(CreepRecord, axis.creep),
+        base.hysteresis_to(axis.hysteresis, name, arrays),
+        base.vibration_to(axis.vibration),
+        recast(base.CreepRecord, axis.creep),
         None if known is None else recast(_ModelDiscrepancy, known),
         added_to(axis.added),
         tuple(recast(_ModelDiscrepancy, each) for each in axis.known_elsewhere),
         _Effects(*(recast(_Effect, status) for _, status in axis.effects.each())),
-        None if axis.sensor is None else recast(SensorRecord, axis.sensor),
-        None if axis.spread is None else spread_to(axis.spread, name, arrays),
+        None if axis.sensor is None else recast(base.SensorRecord, axis.sensor),
+        None if axis.spread is None else base.spread_to(axis.spread, name, arrays),
     )

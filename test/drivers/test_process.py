@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers import DriverChoice, client
-from afm_scan_ros.drivers.calls import take_priority
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import DriverTimeouts, Link, Message, ramp_bound
+from afm_scan_ros.drivers.process import take_priority
 from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant

@@ -17,7 +17,6 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 from afm_scan_ros.features.images.loops import moving
 from afm_scan_ros.features.images.loops.density import CellGrid, NormalEquations, solve
 from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept, swept
-from afm_scan_ros.features.images.loops.ripple import rippling
 from afm_scan_ros.features.images.loops.search import (
     NO_CREEP,
     Densities,
@@ -26,6 +25,7 @@ from afm_scan_ros.features.images.loops.search import (
     Lag,
     OneCreep,
     at_once,
+    rippling,
     search,
 )
 

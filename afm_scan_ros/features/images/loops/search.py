@@ -2,7 +2,8 @@
 
 Displacement = origin + Gc · G · H(u). For each G and Gc the density of H follows by non-negative
 least squares, so that few numbers are searched for (variable projection). They hardly depend on
-the grid of the density and are found on a coarse one.
+the grid of the density and are found on a coarse one. A resonance shows by its ripple in all that
+moves: no free decay is asked for, as images show no turns.
 """
 
 from abc import ABC, abstractmethod
@@ -13,6 +14,7 @@ from operator import add
 import numpy as np
 from attrs import evolve, frozen
 from scipy.optimize import least_squares
+from scipy.signal import argrelmin
 from scipy.stats import t as student
 
 from afm_scan_ros.core.effects.creep import CreepModel
@@ -229,3 +231,71 @@ def of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterIn
     if half > FARTHEST:
         return ParameterInterval(name, unit)
     return closed(name, (float(np.exp(value - half)), float(np.exp(value + half))), unit)
+
+
+RATIO = 1.06
+"""Ratio of neighbouring frequencies that are tried."""
+BEST = 3
+"""Frequencies tried from which a search begins."""
+DAMPINGS = np.log([1e-3, 0.02, 0.5])
+"""Least, first and greatest logarithm of the damping ratio."""
+CYCLES = 3.0
+"""Fewest cycles in a swing, as a loop bends less often."""
+ROWS_A_CYCLE = 4.0
+"""Fewest rows of a cycle that show it."""
+
+
+class ResonanceForm(Form):
+    """G = 1/(1 + 2ζs/ω + s²/ω²), of the logarithms of ω near a first one (Hz), and of ζ."""
+
+    def __init__(self, hertz: float) -> None:
+        first = np.log(2.0 * np.pi * hertz)
+        near = 2.0 * np.log(RATIO)
+        self.bounds = np.column_stack([[first - near, first, first + near], DAMPINGS])
+
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
+        """Put the resonance in the vibration's place."""
+        omega, zeta = (float(each) for each in np.exp(values))
+        mode = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
+        return evolve(dynamics, vibration=mode)
+
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """Intervals of frequency (Hz) and damping (1)."""
+        hertz = float(values[0] - np.log(2.0 * np.pi))
+        return (
+            of_logarithm("resonance", hertz, half[0], "Hz"),
+            of_logarithm("damping", values[1], half[1], "1"),
+        )
+
+    def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
+        """Whether the frequency is known as finely as it was tried."""
+        return bool(half[0] < np.log(RATIO))
+
+
+def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) -> Found | None:
+    """Resonance of gain 1 at rest; None where the records do not identify it.
+
+    Raises ScanError where a search does not converge.
+    """
+    evidence = Densities(swept, smoothing)
+    tried = _tried([one.record for one in swept], min(one.row_period for one in swept))
+    misses = np.array([_missed(evidence, known, float(hertz)) for hertz in tried])
+    places = sorted(argrelmin(misses, mode="clip")[0], key=lambda place: misses[place])[:BEST]
+    found = [search(evidence, known, [ResonanceForm(float(tried[place]))]) for place in places]
+    seen = (each for each in found if all(each.identified))
+    return min(seen, key=lambda each: float(each.residual @ each.residual), default=None)
+
+
+def _tried(records: Sequence[MovingRecord], row_period: float) -> Array:
+    """Frequencies (Hz) of enough cycles in the fastest swing, and of rows enough in a cycle."""
+    lowest = CYCLES * max(one.swings for one in records)
+    highest = max(1.0 / (ROWS_A_CYCLE * row_period), lowest)
+    return np.asarray(
+        np.geomspace(lowest, highest, 1 + int(np.log(highest / lowest) / np.log(RATIO)))
+    )
+
+
+def _missed(evidence: Densities, known: LinearDynamics, hertz: float) -> float:
+    form = ResonanceForm(hertz)
+    residual = evidence.residual(form.put(known, form.bounds[1]))
+    return float(residual @ residual)
