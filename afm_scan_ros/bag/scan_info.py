@@ -7,15 +7,7 @@ import numpy as np
 from attrs import asdict, define, field, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.bag.typestore import (
-    PACKAGE,
-    Message,
-    MessageLayout,
-    decode,
-    encode,
-    layout_of,
-    stamp_of,
-)
+from afm_scan_ros.bag import typestore
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import PATTERNS, ScanSpec, scan_parameters
@@ -23,7 +15,7 @@ from afm_scan_ros.core.streams import LineError, MonitorSample
 from afm_scan_ros.core.trajectory import total_samples
 from afm_scan_ros.core.types import AXES, Trace
 
-TYPE = f"{PACKAGE}/ScanInfo"
+TYPE = f"{typestore.PACKAGE}/ScanInfo"
 INSTANTS = ("before_update", "after_update")
 """When a sample is taken, seen from the converter's update."""
 SHORTEST, LONGEST = 1e-9, 2**63 * 1e-9
@@ -43,7 +35,7 @@ def info_fields(info: ScanInfo) -> dict[str, Any]:
     return {**fields, **own, **lists}
 
 
-def info_from_message(message: Message) -> ScanInfo:
+def info_from_message(message: typestore.Message) -> ScanInfo:
     """Read a ``ScanInfo`` message.
 
     Raises InputError where it contradicts itself, or states what cannot be.
@@ -56,7 +48,7 @@ def info_from_message(message: Message) -> ScanInfo:
             raise InputError(f"scan_info: {error}") from error
     info = ScanInfo(
         scan_id=message.scan_id,
-        start=stamp_of(message),
+        start=typestore.stamp_of(message),
         pattern=message.pattern,
         sample_period=float(message.sample_period),
         total_samples=int(message.total_samples),
@@ -104,20 +96,20 @@ def _other_scan(info: ScanInfo, spec: ScanSpec) -> str:
 
 def encode_info(info: ScanInfo) -> bytes:
     """CDR of the ``ScanInfo`` message."""
-    return encode(TYPE, info.start, info_fields(info))
+    return typestore.encode(TYPE, info.start, info_fields(info))
 
 
 def decode_info(cdr: bytes) -> ScanInfo:
     """Read a ``ScanInfo`` from its CDR; raises InputError where it is not one."""
     try:
-        message = decode(TYPE, cdr)
+        message = typestore.decode(TYPE, cdr)
     except ValueError as error:
         raise InputError(f"scan_info: {error}") from error
     return info_from_message(message)
 
 
-DISPLACEMENT = f"{PACKAGE}/DisplacementBlock"
-VOLTAGE = f"{PACKAGE}/VoltageBlock"
+DISPLACEMENT = f"{typestore.PACKAGE}/DisplacementBlock"
+VOLTAGE = f"{typestore.PACKAGE}/VoltageBlock"
 
 STREAMS = {
     "desired_displacement": DISPLACEMENT,
@@ -131,19 +123,20 @@ LINE_FIGURES = ("tracking_error", "model_residual")
 """Topics with the figures of each line."""
 MONITOR = "monitor"
 """Topic with single samples."""
-LINE, SAMPLE = f"{PACKAGE}/TrackingError", f"{PACKAGE}/MonitorSample"
+LINE, SAMPLE = f"{typestore.PACKAGE}/TrackingError", f"{typestore.PACKAGE}/MonitorSample"
 
 
 def encode_line(info: ScanInfo, figures: LineError) -> bytes:
     """CDR of the ``TrackingError`` message of one line."""
-    fields = asdict(figures, filter=lambda a, _: a.name != "first_sample")
-    return encode(LINE, info.stamp(figures.first_sample), {"scan_id": info.scan_id, **fields})
+    figures_of_line = asdict(figures, filter=lambda a, _: a.name != "first_sample")
+    fields = {"scan_id": info.scan_id, **figures_of_line}
+    return typestore.encode(LINE, info.stamp(figures.first_sample), fields)
 
 
 def encode_sample(info: ScanInfo, sample: MonitorSample) -> bytes:
     """CDR of the ``MonitorSample`` message."""
     fields = {"scan_id": info.scan_id, **asdict(sample)}
-    return encode(SAMPLE, info.stamp(sample.sample), fields)
+    return typestore.encode(SAMPLE, info.stamp(sample.sample), fields)
 
 
 @frozen(eq=False)
@@ -165,7 +158,7 @@ def encode_block(type_name: str, info: ScanInfo, trace: Trace, *, last: bool) ->
         "y": np.ascontiguousarray(trace.y),
         "last": last,
     }
-    return encode(type_name, info.stamp(trace.first_sample), fields)
+    return typestore.encode(type_name, info.stamp(trace.first_sample), fields)
 
 
 def decode_block(type_name: str, cdr: bytes) -> Block:
@@ -173,7 +166,7 @@ def decode_block(type_name: str, cdr: bytes) -> Block:
 
     The samples are copied, for compiled loops take arrays that can be written.
     """
-    message = decode(type_name, cdr)
+    message = typestore.decode(type_name, cdr)
     trace = Trace(
         int(message.first_sample),
         float(message.sample_period),
@@ -188,9 +181,10 @@ def info_of_block(type_name: str, cdr: bytes) -> ScanInfo:
 
     Raises ValueError where it is not one.
     """
-    block, stamp = decode_block(type_name, cdr), stamp_of(decode(type_name, cdr))
-    before = round(block.trace.first_sample * block.trace.sample_period * 1e9)
+    block = decode_block(type_name, cdr)
+    stamp = typestore.stamp_of(typestore.decode(type_name, cdr))
     period = block.trace.sample_period
+    before = round(block.trace.first_sample * period * 1e9)
     return ScanInfo(block.scan_id, stamp - before, "recording", period, total_samples=0)
 
 
@@ -199,7 +193,7 @@ class BlockDecoder:
     """Decodes the messages of one topic; the layout of one serves for those behind it."""
 
     type_name: str
-    _layout: MessageLayout | None = field(default=None, init=False)
+    _layout: typestore.MessageLayout | None = field(default=None, init=False)
 
     def together(self, cdrs: NDArray[np.uint8]) -> Block | None:
         """Blocks of samples that follow each other, as one; their CDRs are ``cdrs`` (n, size).
@@ -209,7 +203,7 @@ class BlockDecoder:
         table = None if self._layout is None else self._layout.table(cdrs)
         if table is None:
             try:
-                self._layout = layout_of(self.type_name, cdrs[0])
+                self._layout = typestore.layout_of(self.type_name, cdrs[0])
             except ValueError:
                 return None
             table = self._layout.table(cdrs)

@@ -7,14 +7,7 @@ import click
 from attrs import evolve
 
 from afm_scan_ros import identification as api
-from afm_scan_ros.cli.options import (
-    FIGURES,
-    NEW_FILE,
-    RECORD,
-    TableOptions,
-    record_options,
-    refuse_existing,
-)
+from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
@@ -32,16 +25,16 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 
 
 @click.command()
-@click.argument("records", type=RECORD, nargs=-1, metavar="[RECORD]...")
-@click.option("--creep", type=RECORD, help="Record of steps that are held.")
-@click.option("--frequency", type=RECORD, help="Record of multisines or of a sweep.")
-@click.option("--hysteresis", type=RECORD, help="Record of reversal curves or of loops.")
+@click.argument("records", type=options.RECORD, nargs=-1, metavar="[RECORD]...")
+@click.option("--creep", type=options.RECORD, help="Record of steps that are held.")
+@click.option("--frequency", type=options.RECORD, help="Record of multisines or of a sweep.")
+@click.option("--hysteresis", type=options.RECORD, help="Record of reversal curves or of loops.")
 @click.option(
     "--validation",
-    type=RECORD,
+    type=options.RECORD,
     help="Record held out of the fit, which gives the model discrepancy.",
 )
-@record_options
+@options.record_options
 @click.option(
     "--effect",
     "effects",
@@ -61,19 +54,19 @@ HEADING = "A scanner's model, written by 'afm-scan identify' from its calibratio
 )
 @click.option(
     "--out",
-    type=NEW_FILE,
+    type=options.NEW_FILE,
     default="model.yaml",
     show_default=True,
     help="Model file to write. Its arrays, MODEL.fit.json and MODEL.fit.html are written beside it."
     " Records of one axis give a model of that axis.",
 )
-@FIGURES
+@options.FIGURES
 def identify(
     records: tuple[Path, ...],
     effects: tuple[str, ...],
     states: int | None,
     out: Path,
-    tables: TableOptions,
+    tables: options.TableOptions,
     *,
     linear: bool,
     figures: str | None,
@@ -84,7 +77,7 @@ def identify(
     All are fitted at once. An option only names a record; --validation keeps one out of the fit.
     """
     written = (out.suffix, ".npz", ".fit.json", ".fit.html")
-    refuse_existing(*map(out.with_suffix, written), other="file")
+    options.refuse_existing(*map(out.with_suffix, written), other="file")
     given = [tables.read(path) for path in records]
     given += [evolve(tables.read(bag), kind=kind) for kind, bag in bags.items() if bag]
     if not given:

@@ -7,16 +7,7 @@ import click
 import numpy as np
 
 from afm_scan_ros.bag.writer import write_record
-from afm_scan_ros.cli.options import (
-    BAG,
-    FILE,
-    NEW_FILE,
-    TableOptions,
-    positive,
-    refuse_existing,
-    table_options,
-    warn,
-)
+from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import PLANS
@@ -41,9 +32,9 @@ STREAM = {
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True, type=FILE)
-@table_options
-@click.option("--bag", required=True, type=BAG, help="Folder to create for the bag.")
+@click.argument("files", nargs=-1, required=True, type=options.FILE)
+@options.table_options
+@click.option("--bag", required=True, type=options.BAG, help="Folder to create for the bag.")
 @click.option(
     "--start-row", type=click.IntRange(1), default=1, help="First row to import, counted from 1."
 )
@@ -68,7 +59,7 @@ def import_csv(
     stop_row: int | None,
     record: str,
     sampling_instant: str,
-    tables: TableOptions,
+    tables: options.TableOptions,
 ) -> None:
     """Convert FILES to a bag: text with any separator and heading, .npy, .npz or .mat.
 
@@ -89,8 +80,8 @@ def import_csv(
         for problem in islice(problems(read), 1):
             if record in PLANS:
                 raise InputError(f"{files[0]}: {problem}")
-            warn([f"{files[0]}: {problem}"])
-    warn(found.notes)
+            options.warn([f"{files[0]}: {problem}"])
+    options.warn(found.notes)
     info = ScanInfo(
         files[0].stem,
         start=0,
@@ -129,31 +120,31 @@ def _streams(record: TableRecord) -> dict[str, Trace]:
 
 
 @click.command()
-@click.option("--model", type=FILE, required=True, help="Model file of the scanner.")
+@click.option("--model", type=options.FILE, required=True, help="Model file of the scanner.")
 @click.option(
     "--desired",
-    type=FILE,
+    type=options.FILE,
     required=True,
     help="Table of the path, from rest at zero: text, .npy, .npz or .mat with headings as 'time"
     " [s]' and 'desired_x [um]'.",
 )
-@click.option("--out", type=NEW_FILE, required=True, help="CSV file of the drive to write.")
-@table_options
-@click.option("--limit", type=positive("V"), help="Voltage that the drive must not exceed.")
+@click.option("--out", type=options.NEW_FILE, required=True, help="CSV file of the drive to write.")
+@options.table_options
+@click.option("--limit", type=options.positive("V"), help="Voltage that the drive must not exceed.")
 def invert(
     model: Path,
     desired: Path,
     out: Path,
-    tables: TableOptions,
+    tables: options.TableOptions,
     limit: float | None,
 ) -> None:
     """Write the drive that makes the scanner follow a path, with all inverses of its model."""
-    refuse_existing(out, other="file")
+    options.refuse_existing(out, other="file")
     scanner = load_model(model)
     rows = RowRange(tables.skip_rows)
     with working("reading the table", at_once=False):
         found = read_table_record([desired], tables.parsed, rows, tables.sample_rate, USE_OF_PATH)
-    warn(found.notes)
+    options.warn(found.notes)
     path = found.signals.get("desired", {})
     if set(path) != set(scanner.axes):
         names = ", ".join(f"desired_{axis}" for axis in scanner.axes)

@@ -9,19 +9,7 @@ import numpy as np
 
 from afm_scan_ros import diagnosis as api
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.options import (
-    FIGURES,
-    FILE,
-    FOLDER,
-    NEW_FILE,
-    RECORD,
-    TableOptions,
-    positive,
-    record_options,
-    refuse_existing,
-    topic_option,
-    warn,
-)
+from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import ScanError
@@ -40,16 +28,16 @@ from afm_scan_ros.report.terminal import say
 
 
 @click.command()
-@click.argument("bag", type=RECORD)
-@click.option("--json", "json_file", type=NEW_FILE, help="Write all numbers as JSON.")
-@click.option("--report", type=NEW_FILE, help="Write a report as one HTML file.")
+@click.argument("bag", type=options.RECORD)
+@click.option("--json", "json_file", type=options.NEW_FILE, help="Write all numbers as JSON.")
+@click.option("--report", type=options.NEW_FILE, help="Write a report as one HTML file.")
 @click.option(
     "--figure",
-    type=NEW_FILE,
+    type=options.NEW_FILE,
     help="Write the figure; the suffix gives the format: .png, .svg, .pdf.",
 )
-@FIGURES
-@topic_option
+@options.FIGURES
+@options.topic_option
 def analyze(
     bag: Path,
     json_file: Path | None,
@@ -66,11 +54,11 @@ def analyze(
         alone = comparable(recording) and report is None and figure is None
         found = compare(recording) if alone else analyse(recording)
     if isinstance(found, Comparison):
-        warn(recording.warnings)
+        options.warn(recording.warnings)
         _show_comparison(found, json_file)
         return
     analysis = found
-    warn(analysis.warnings)
+    options.warn(analysis.warnings)
     show([Rows((), scan_rows(analysis)), *error_tables(analysis)])
     if json_file is not None:
         write_text(json_file, json.dumps(plain(analysis), indent=2) + "\n")
@@ -102,17 +90,17 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
 
 
 @click.command()
-@click.argument("bags", nargs=-1, required=True, type=RECORD, metavar="BAG...")
+@click.argument("bags", nargs=-1, required=True, type=options.RECORD, metavar="BAG...")
 @click.option(
     "--model",
     required=True,
-    type=FILE,
+    type=options.FILE,
     help="Model file of the scanner, with its model discrepancy (model_discrepancy).",
 )
 @click.option(
     "--healthy",
     multiple=True,
-    type=RECORD,
+    type=options.RECORD,
     metavar="RECORD",
     help="Record of the scanner while it was healthy, as an ordinary scan. It adds the model's"
     " error on such motion. May be given several times.",
@@ -120,12 +108,12 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
 @click.option(
     "--out",
     required=True,
-    type=FOLDER,
+    type=options.FOLDER,
     help="Folder for diagnosis.json, model.extended.yaml, report.html.",
 )
 @click.option(
     "--longest",
-    type=positive("s"),
+    type=options.positive("s"),
     default=f"{LONGEST:g}s",
     show_default=True,
     help="Length of the proposed experiment, at most.",
@@ -136,15 +124,15 @@ def _show_comparison(found: Comparison, json_file: Path | None) -> None:
     help="Ask what the structure of the model lacks, and not what has changed since it was"
     " identified: its stated error then explains nothing.",
 )
-@FIGURES
-@record_options
+@options.FIGURES
+@options.record_options
 def diagnose(  # noqa: PLR0913 - click hands over one parameter an option
     bags: tuple[Path, ...],
     model: Path,
     healthy: tuple[Path, ...],
     out: Path,
     longest: float,
-    tables: TableOptions,
+    tables: options.TableOptions,
     *,
     structure: bool,
     figures: str | None,
@@ -154,7 +142,7 @@ def diagnose(  # noqa: PLR0913 - click hands over one parameter an option
     A BAG is a rosbag2 folder or an .mcap file with drive_voltage and achieved_displacement, or a
     table of drive and displacement. Of coupled axes each is a realisation, as for 'identify'.
     """
-    refuse_existing(out / "diagnosis.json")
+    options.refuse_existing(out / "diagnosis.json")
     base = load_model(model)
     records, well = ([tables.read(bag) for bag in some] for some in (bags, healthy))
     with working("diagnosing") as progress:
@@ -162,7 +150,7 @@ def diagnose(  # noqa: PLR0913 - click hands over one parameter an option
         progress("describing the residual")
         found.save(out, figures)
     for record in (*records, *well):
-        warn(_doubts(record))
+        options.warn(_doubts(record))
     show(found.summary)
     say(f"Report: {out / 'report.html'}. JSON and extended model are beside it.")
 

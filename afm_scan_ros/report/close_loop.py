@@ -7,15 +7,7 @@ from afm_scan_ros.core.comparison import ScanComparison
 from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.report.diagnosis_text import (
-    HELD_OUT,
-    brief,
-    effects,
-    limits_text,
-    next_steps,
-    residuals,
-    verdict_text,
-)
+from afm_scan_ros.report import diagnosis_text as text
 from afm_scan_ros.report.page import PageLink, ReportPage, Section
 from afm_scan_ros.report.page import Part as PagePart
 from afm_scan_ros.report.picture import Picture
@@ -73,10 +65,10 @@ def reported(rounds: Sequence[Round]) -> Round:
 
 def round_result(done: Round) -> Iterator[Part]:
     """Yield what a round found and what its extended model changed, in sentences and tables."""
-    yield from verdict_text(done.diagnosis)
-    yield from effects(done.diagnosis)
-    yield residuals(done.diagnosis)
-    yield HELD_OUT
+    yield from text.verdict_text(done.diagnosis)
+    yield from text.effects(done.diagnosis)
+    yield text.residuals(done.diagnosis)
+    yield text.HELD_OUT
     if done.comparisons:
         yield Rows(TRACKING, _trial_rows(done, _tracked))
     yield from outcome(done)
@@ -84,7 +76,7 @@ def round_result(done: Round) -> Iterator[Part]:
 
 def outcome(done: Round) -> Iterator[str]:
     """Yield what limits a round's verdict, and what its extended model changed."""
-    yield from limits_text(done.diagnosis)
+    yield from text.limits_text(done.diagnosis)
     if done.experiments:
         yield f"Experiments recorded to resolve an ambiguity: {', '.join(done.experiments)}."
     if done.diagnosis.effects and not done.comparisons and not done.refusal:
@@ -153,9 +145,9 @@ def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = ""
     shown = next((n for n, done in numbered if done is last and done.comparisons), None)
     return ReportPage(
         title="Closed loop: scan, diagnose, extend, scan again",
-        answer=[*brief(found), " ".join(final_text(rounds, failure))],
+        answer=[*text.brief(found), " ".join(final_text(rounds, failure))],
         picture=_lines(last, shown) if shown else None,
-        next_steps=list(next_steps(found)),
+        next_steps=list(text.next_steps(found)),
         evidence=[
             *(_round(number, done, first=number == shown) for number, done in numbered),
             Section("Method", [METHOD]),

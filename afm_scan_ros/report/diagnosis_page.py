@@ -21,23 +21,8 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.coupled_file import save_coupled
 from afm_scan_ros.files.model_file import save_model
+from afm_scan_ros.report import diagnosis_text as text
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
-from afm_scan_ros.report.diagnosis_text import (
-    LIMITS,
-    TRIED,
-    VERDICTS,
-    alternative_rows,
-    brief,
-    described,
-    evidence_text,
-    form_text,
-    next_steps,
-    probabilities,
-    probability_text,
-    result,
-    share_text,
-    why_not_text,
-)
 from afm_scan_ros.report.page import ReportPage, Section
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import Provenance, heading_lines
@@ -76,11 +61,11 @@ def diagnosis_report(found: ResidualReport, of: Provenance) -> ReportPage:
     ]
     return ReportPage(
         title="Diagnosis of a scanner's residual",
-        answer=[*brief(diagnosis), *_change(diagnosis)],
+        answer=[*text.brief(diagnosis), *_change(diagnosis)],
         picture=drawn[first][0],
-        next_steps=list(next_steps(diagnosis)),
+        next_steps=list(text.next_steps(diagnosis)),
         evidence=[
-            Section("Effects, probabilities and residuals", list(result(diagnosis))),
+            Section("Effects, probabilities and residuals", list(text.result(diagnosis))),
             *_effect_sections(diagnosis),
             *residuals,
             Section("Records", [Rows(RECORDS, list(_records(found)))]),
@@ -107,9 +92,9 @@ def _effect_sections(found: ScannerDiagnosis) -> Iterator[Section]:
     evidence = list(_effects(found))
     if evidence:
         yield Section("Evidence for the effects", [*evidence, SHARES])
-    alternatives = alternative_rows(found)
+    alternatives = text.alternative_rows(found)
     if alternatives:
-        yield Section("Alternatives", [Rows(TRIED, alternatives)])
+        yield Section("Alternatives", [Rows(text.TRIED, alternatives)])
 
 
 def _records(found: ResidualReport) -> Iterator[tuple[str, ...]]:
@@ -131,14 +116,14 @@ def _pictures(found: ResidualReport, diagnosed: AxisDiagnosis) -> tuple[Picture,
 def _effects(found: ScannerDiagnosis) -> Iterator[str]:
     """Yield the equation of each effect and the evidence for it."""
     for effect in found.effects:
-        yield form_text(effect)
-        yield " ".join((share_text(effect), *evidence_text(effect)))
+        yield text.form_text(effect)
+        yield " ".join((text.share_text(effect), *text.evidence_text(effect)))
     if any(effect.periodic for effect in found.effects):
         yield CONVENTION
 
 
 def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
-    yield described(found, axis)
+    yield text.described(found, axis)
     diagnosed = found.diagnosis.by_axis[axis]
     if diagnosed.final is not diagnosed.chain:
         record = most_excited_record(diagnosed)
@@ -166,12 +151,12 @@ HELD_OUT = "Residuals are rms of the last record of each amplitude, which no fit
 
 def coupled_result(found: CoupledDiagnosis) -> Iterator[Part]:
     """Yield verdict, effects, probabilities and residuals."""
-    yield VERDICTS[found.verdict]
+    yield text.VERDICTS[found.verdict]
     if found.effects:
         shares = [(e, significant(100.0 * e.explained_fraction)) for e in found.effects]
-        named = [(e.name, probability_text(e.probability), share) for e, share in shares]
+        named = [(e.name, text.probability_text(e.probability), share) for e, share in shares]
         yield Rows(COUPLED_ROWS, named)
-    yield from probabilities(found)
+    yield from text.probabilities(found)
     figures = found.rms_before, found.rms_after, found.noise_floor
     left = [(axis, *(nanometres(of[axis]) for of in figures)) for axis in found.base.axes]
     yield Rows(RESIDUALS, left)
@@ -199,7 +184,7 @@ def coupled_next_steps(found: CoupledDiagnosis) -> Iterator[str]:
         yield "Use model.extended.yaml in place of the model."
     for effect in (e for e in COUPLED_EFFECTS if e.name in found.selected):
         advice = effect.advice[0].upper() + effect.advice[1:]
-        yield f"{effect.name}. {LIMITS[effect.remedy]}. {advice}."
+        yield f"{effect.name}. {text.LIMITS[effect.remedy]}. {advice}."
 
 
 def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Provenance) -> None:
@@ -226,7 +211,7 @@ def coupled_report(found: CoupledDiagnosis, of: Provenance) -> ReportPage:
         next_steps=list(coupled_next_steps(found)),
         evidence=[
             Section("Effects, probabilities and residuals", rest),
-            Section("Alternatives", [Rows(TRIED, _alternatives(found))]),
+            Section("Alternatives", [Rows(text.TRIED, _alternatives(found))]),
             Section("Method", [COUPLED_METHOD]),
         ],
         warnings=of.shortcomings,
@@ -251,7 +236,7 @@ def coupled_document(found: CoupledDiagnosis) -> dict[str, Any]:
                 "axis": other.axis,
                 "score": other.score if math.isfinite(other.score) else None,
                 "probability": other.probability,
-                "why_not": why_not_text(other),
+                "why_not": text.why_not_text(other),
             }
             for other in found.alternatives
         ],
@@ -288,6 +273,6 @@ def _effect(effect: IdentifiedEffect) -> dict[str, Any]:
 
 def _alternatives(found: CoupledDiagnosis) -> list[tuple[str, ...]]:
     return [
-        (other.name, other.axis, probability_text(other.probability), why_not_text(other))
+        (other.name, other.axis, text.probability_text(other.probability), text.why_not_text(other))
         for other in found.alternatives
     ]

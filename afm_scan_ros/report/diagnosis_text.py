@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from decimal import ROUND_DOWN, Context
 
+from afm_scan_ros.core.diagnosis import cautions
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
     FOUND,
@@ -11,13 +12,6 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     SUFFICIENT,
     UNEXPLAINED,
     AxisDiagnosis,
-)
-from afm_scan_ros.core.diagnosis.cautions import (
-    AboveDetectionLimit,
-    Caution,
-    SingleRate,
-    UnlikeHealthy,
-    UntestedMotion,
 )
 from afm_scan_ros.core.diagnosis.coupled.diagnosis import CoupledDiagnosis
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
@@ -306,21 +300,21 @@ def limits_text(found: ScannerDiagnosis) -> Iterator[str]:
     yield from map(caution_text, found.cautions)
 
 
-def caution_text(of: Caution) -> str:
+def caution_text(of: cautions.Caution) -> str:
     """Say what limits a verdict."""
-    if isinstance(of, SingleRate):
+    if isinstance(of, cautions.SingleRate):
         return (
             f"{of.axis}: the model was tested at {of.low:g} to {of.high:g} Hz alone. Its hysteresis"
             " may then contain lag, delay or viscosity. These may be hidden, or stand for the"
             " effect that is named. Identify the model with loops at several rates."
         )
-    if isinstance(of, UntestedMotion):
+    if isinstance(of, cautions.UntestedMotion):
         tested = f" The model was tested with at least {_motion(of.tested)}." if of.tested else ""
         return (
             f"{of.axis}: the model's error is not known for the motion of {of.record},"
             f" {_motion(of.motion)}.{tested} What the record shows may be this error."
         )
-    if isinstance(of, UnlikeHealthy):
+    if isinstance(of, cautions.UnlikeHealthy):
         return (
             f"{of.axis}: {of.record} leaves {of.ratio:.2g} times the model's detection limit from"
             f" {of.low:g} to {of.high:g} Hz, and raises it. The other healthy records do not show"
@@ -333,7 +327,7 @@ def _motion(of: MotionByBand) -> str:
     return f"{nanometres(of.size)} nm rms at {of.low:g} to {of.high:g} Hz"
 
 
-def _above_limit(of: AboveDetectionLimit) -> str:
+def _above_limit(of: cautions.AboveDetectionLimit) -> str:
     why = "No effect is significant. It may be chance, or an effect too small to identify."
     if of.others:
         why = (

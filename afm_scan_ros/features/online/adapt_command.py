@@ -7,15 +7,7 @@ import click
 from attrs import evolve
 
 from afm_scan_ros.bag.reader import read_scan
-from afm_scan_ros.cli.options import (
-    FILE,
-    NEW_FILE,
-    RECORD,
-    positive,
-    refuse_existing,
-    topic_option,
-    warn,
-)
+from afm_scan_ros.cli import options
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.features.online.adaptation import (
     CREEP_NAME,
@@ -49,17 +41,19 @@ HEADING = "A scanner's model with the changes that 'afm-scan adapt' found in {ba
 
 
 @click.command()
-@click.argument("bag", type=RECORD)
-@click.option("--model", required=True, type=FILE, help="Model file of the scanner.")
-@click.option("--out", required=True, type=NEW_FILE, help="Model file to write, with the changes.")
+@click.argument("bag", type=options.RECORD)
+@click.option("--model", required=True, type=options.FILE, help="Model file of the scanner.")
+@click.option(
+    "--out", required=True, type=options.NEW_FILE, help="Model file to write, with the changes."
+)
 @click.option(
     "--time-constant",
-    type=positive("s"),
+    type=options.positive("s"),
     default=f"{TIME_CONSTANT:g}s",
     show_default=True,
     help="Memory of the estimator.",
 )
-@topic_option
+@options.topic_option
 def adapt(
     bag: Path, model: Path, out: Path, time_constant: float, topics: Mapping[str, str]
 ) -> None:
@@ -68,9 +62,9 @@ def adapt(
     The model written holds the values at the end of the scan. Nothing is written where nothing has
     changed beyond the detection limit.
     """
-    refuse_existing(out, out.with_suffix(".npz"), other="file")
+    options.refuse_existing(out, out.with_suffix(".npz"), other="file")
     base, recording = model_file.load_model(model), read_scan(bag, topics)
-    warn(recording.warnings)
+    options.warn(recording.warnings)
     if recording.info.spec is None:
         raise InputError(
             f"{bag}: adaptation compares lines, but scan_info states none: give the bag of a scan"
