@@ -125,18 +125,11 @@ class _NoAliases(yaml.SafeDumper):
         return True
 
 
-@frozen
-class BagFiles:
-    """The files of a bag in order, and a sentence for each thing that is missing."""
+def bag_files(path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """Find the files of a rosbag2 folder or a single ``.mcap``, in order.
 
-    files: tuple[Path, ...]
-    warnings: tuple[str, ...]
-
-
-def bag_files(path: Path) -> BagFiles:
-    """Find the files of a rosbag2 folder or a single ``.mcap``.
-
-    Raises InputError where there are none, or they are not MCAP.
+    Also returns a sentence for each thing that is missing. Raises InputError where there are none,
+    or they are not MCAP.
     """
     if path.is_dir():
         files, warnings = _files_of_folder(path)
@@ -148,7 +141,7 @@ def bag_files(path: Path) -> BagFiles:
         if not is_mcap(file):
             raise InputError(f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap'")
         _refuse_sizes(file)
-    return BagFiles(files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f)))
+    return files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f))
 
 
 _CHUNK_HEAD = struct.Struct("<QQQ")  # both times of a chunk, and the bytes that it unpacks to
@@ -199,7 +192,11 @@ def _files_of_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
 
 
 def _listed(folder: Path) -> tuple[Path, ...]:
-    metadata = _read(folder)
+    try:
+        metadata = read_metadata(folder / NAME)
+    except InputError as error:
+        mend = f"remove it and run 'ros2 bag reindex {folder} -s mcap'"
+        raise InputError(f"{error}: not a rosbag2 metadata file: {mend}") from error
     storage = metadata.get("storage_identifier", "mcap")
     compression = metadata.get("compression_mode", "")
     if storage != "mcap" or compression:
@@ -214,14 +211,6 @@ def _listed(folder: Path) -> tuple[Path, ...]:
         if not (folder / name).is_file():
             raise InputError(f"{folder / NAME} names {name}, which is missing: bring it back")
     return tuple(folder / name for name in names)
-
-
-def _read(folder: Path) -> Mapping[str, Any]:
-    try:
-        return read_metadata(folder / NAME)
-    except InputError as error:
-        mend = f"remove it and run 'ros2 bag reindex {folder} -s mcap'"
-        raise InputError(f"{error}: not a rosbag2 metadata file: {mend}") from error
 
 
 def _by_number(path: Path) -> tuple[int, str]:

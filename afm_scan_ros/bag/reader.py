@@ -191,10 +191,10 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
     the first block of samples states what is known. Raises InputError where there are no blocks
     either, naming what is missing and what is there. Damage further in shows where it is read.
     """
-    found = bag_files(path)
+    files, missing = bag_files(path)
     there: dict[str, str] = {}
     infos: dict[str, dict[bytes, None]] = {}
-    for message in (message for file in found.files for message in outline(file, SCAN_INFO)):
+    for message in (message for file in files for message in outline(file, SCAN_INFO)):
         there[message.topic] = message.type_name
         if message.type_name == SCAN_INFO:
             different = infos.setdefault(message.topic, {})
@@ -209,11 +209,11 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
     for cdr in infos.get(topics.pop("scan_info", ""), ()):
         info = _info(cdr, info, path)
     if info is None and topics:
-        first = _first_info(path, found.files, topics)
-        warnings = (*found.warnings, _without_info(path))
-        return ScanRecording(path, first, topics, warnings, found.files, stated=False)
+        first = _first_info(path, files, topics)
+        warnings = (*missing, _without_info(path))
+        return ScanRecording(path, first, topics, warnings, files, stated=False)
     if info is None:
-        notes = "".join(f"; {warning}" for warning in found.warnings)
+        notes = "".join(f"; {warning}" for warning in missing)
         if not there:
             raise InputError(f"{path}: holds no messages at all{notes}")
         mend = f"; if it is one file of a bag, read {path.parent}" if path.is_file() else ""
@@ -221,7 +221,7 @@ def read_scan(path: Path, chosen: Mapping[str, str] = MappingProxyType({})) -> S
             f"{path}: holds no scan_info of type {SCAN_INFO}, but {', '.join(sorted(there))}"
             f"{notes}{mend}"
         )
-    return ScanRecording(path, info, topics, found.warnings, found.files)
+    return ScanRecording(path, info, topics, missing, files)
 
 
 def _short(message: RawMessage, path: Path) -> bytes:

@@ -92,7 +92,8 @@ def identify(
         _show_coupled(model.coupled)
         say(f"Wrote {out} and {out.with_suffix('.npz').name} beside it.")
         return
-    _show(model.fit)
+    for axis, fitted in model.fit.axes.items():
+        _show_axis(axis, fitted)
     of = "" if len(model.axes) == len(AXES) else f" of {model.axes[0]} alone"
     say(f"Wrote {out}{of}, {out.with_suffix('.npz').name} and the fit report beside it.")
 
@@ -112,11 +113,6 @@ def _show_coupled(found: CoupledScanner) -> None:
             f"   driven by {error.drive_rms:.3g} V rms, held-out record:"
             f" {1e9 * error.error_rms:.1f} nm rms, {error.relative:.2%} of the displacement's"
         )
-
-
-def _show(found: Identification) -> None:
-    for axis, fitted in found.axes.items():
-        _show_axis(axis, fitted)
 
 
 def _show_axis(axis: str, found: FittedAxis) -> None:

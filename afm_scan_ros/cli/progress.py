@@ -116,15 +116,11 @@ class ScanProgress:
         self._bar.console.print(visible(news), highlight=False, soft_wrap=True, markup=False)
 
 
-def _ignore(doing: str) -> None:
-    """Write no line, because a terminal shows the bar."""
-
-
 @contextmanager
 def showing(title: str) -> Iterator[ScanProgress]:
     """Show a scan while it runs."""
     console = Console(stderr=True)
     seen = console.is_terminal
-    report = _ignore if seen else Lines(title, EVERY)
+    report = (lambda _: None) if seen else Lines(title, EVERY)  # where no bar is seen
     with Progress(console=console, transient=True, disable=not seen) as bar:
         yield ScanProgress(bar, bar.add_task(title, total=None), report)

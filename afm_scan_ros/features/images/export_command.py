@@ -218,7 +218,7 @@ def _recorded_images(path: Path) -> dict[str, Array]:
     Raises InputError where several topics show one direction, and for images of other values.
     """
     last: dict[str, tuple[str, bytes]] = {}
-    for run in (run for file in bag_files(path).files for run in runs(file)):
+    for run in (run for file in bag_files(path)[0] for run in runs(file)):
         way = way_of(run.topic)
         if run.type_name != IMAGE or way is None:
             continue

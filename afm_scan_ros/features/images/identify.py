@@ -20,7 +20,7 @@ from afm_scan_ros.features.images.grating.registered_image import (
     register_image,
 )
 from afm_scan_ros.features.images.positions import common_rectangle, predicted_positions, regridded
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
 from afm_scan_ros.model import Model
 
 ACCURACY = 0.0035
@@ -117,7 +117,7 @@ def identify_from_images(
     accuracy = positive("accuracy", accuracy, "as 0.0035 for 0.35 % of a pitch")
     scales = _scales(volts_per_metre)
     for image in given:
-        _both_directions(image)
+        both_sides(image)
         if image.line_time is None:
             raise InputError(
                 f"{image.name}: the time of a line is not known: give line_time, or --line-time"
@@ -213,7 +213,7 @@ def correct_image(model: Model, image: ScanImage, volts_per_metre: ArrayLike = 1
     (63, 64)
     """
     of_type(Model, "model", model, MODEL)
-    _both_directions(of_type(ScanImage, "image", image, IMAGE))
+    both_sides(of_type(ScanImage, "image", image, IMAGE))
     try:
         found = predicted_positions(model.scanner, image, _scales(volts_per_metre))
     except BeyondRangeError as error:
@@ -229,24 +229,19 @@ def _corrected(image: ScanImage, trace: Array, retrace: Array, known: slice) -> 
 
     The line scanned first is not among the lines that are ``known``, and is left out.
     """
-    trace, retrace = trace[known], retrace[known]
-    area, lines = common_rectangle([trace, retrace]), len(trace)
+    places = trace[known], retrace[known]
+    area, lines = common_rectangle(places), len(places[0])
+    pairs = zip(both_sides(image), places, strict=True)
+    there, back = (regridded(heights[known], place, area) for heights, place in pairs)
     return evolve(
         image,
-        trace=regridded(image.trace[known], trace, area),
-        retrace=regridded(_both_directions(image)[known], retrace, area),
+        trace=there,
+        retrace=back,
         range_x=(area.right - area.left) * image.pixels / (image.pixels - 1),
         range_y=(area.top - area.bottom) * lines / (lines - 1),
         overscan=0.0,
         name=f"{Path(image.name).stem}, corrected",
     )
-
-
-def _both_directions(image: ScanImage) -> Array:
-    """Return the retrace; raises InputError where there is none."""
-    if image.retrace is None:
-        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
-    return image.retrace
 
 
 def _scales(volts_per_metre: ArrayLike) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """Where a scanner was while an image was taken, by a model, and the image at such positions."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
@@ -120,7 +122,7 @@ class Rectangle:
     top: float
 
 
-def common_rectangle(positions: list[Array]) -> Rectangle:
+def common_rectangle(positions: Sequence[Array]) -> Rectangle:
     """Largest upright rectangle inside all edges of images of positions (lines, pixels, 2), m.
 
     Raises InputError where there is none.

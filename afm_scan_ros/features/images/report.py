@@ -12,7 +12,7 @@ from afm_scan_ros.features.images.grating.models import APART, Positions
 from afm_scan_ros.features.images.grating.motion import middles
 from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
 from afm_scan_ros.features.images.grating.rough_motion import FINEST
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
 from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.paper import paper_figure
 from afm_scan_ros.report.picture import (
@@ -218,7 +218,7 @@ def _answer(before: ScanImage, after: ScanImage) -> str:
 def _heights(image: ScanImage) -> tuple[str, tuple[Array, Array, Array]]:
     """Return the unit of trace, retrace and their difference, and these without their parabola."""
     factor, unit = (NANO, "nm") if image.unit == "m" else (1.0, image.unit)
-    trace, retrace = (factor * levelled(np.asarray(v)) for v in (image.trace, image.retrace))
+    trace, retrace = (factor * levelled(values) for values in both_sides(image))
     return unit, (trace, retrace, trace - retrace)
 
 

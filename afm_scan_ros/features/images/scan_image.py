@@ -96,3 +96,10 @@ class ScanImage:
     def pixels(self) -> int:
         """Pixels of a line."""
         return int(self.trace.shape[1])
+
+
+def both_sides(image: ScanImage) -> tuple[Array, Array]:
+    """Return trace and retrace of an image; raises InputError where it has no retrace."""
+    if image.retrace is None:
+        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
+    return image.trace, image.retrace

@@ -93,10 +93,6 @@ class _AxisInLoop:
         self.held_back |= grown
         return bool(grown.any())
 
-    def step(self) -> LearningStep:
-        """Return the next step."""
-        return self.learning.step(self.trials, self.held_back, self.best())
-
 
 def learn(
     session: LearningSession,
@@ -130,7 +126,10 @@ def learn(
         yield done
         restored = _added(axes, done)
         if FEWEST - 2 <= number < scans - 1:
-            steps = {name: axis.step() for name, axis in axes.items()}
+            steps = {
+                name: axis.learning.step(axis.trials, axis.held_back, axis.best())
+                for name, axis in axes.items()
+            }
             correction, price = drive.feasible(axes, steps, correction)
 
 

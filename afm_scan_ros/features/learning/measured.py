@@ -123,7 +123,7 @@ def learn(
     of_type(ScanSpec, "spec", spec, SPEC)
     of_type(DriveLimits, "limits", limits or UNLIMITED, LIMITS)
     scans = whole("scans", scans, 1)
-    session = _Measured(measure, limits or UNLIMITED, progress or _silent, scans)
+    session = _Measured(measure, limits or UNLIMITED, progress or (lambda _: None), scans)
     found = list(learning_scans(session, model.scanner, spec, scans, session.limits))
     if not best_of(found).steps:
         LOG.warning("no scan was better than the first two: the correction is zero")
@@ -156,7 +156,3 @@ class _Measured:
             )
         moved = Trace(0, period, measured[:, 0], measured[:, 1])
         return Scan(spec, desired(spec, 0, count), drive, moved)
-
-
-def _silent(_: str) -> None:
-    """Ignore what is being done."""

@@ -20,6 +20,7 @@ weights is the cross-fade of the outputs of two filters that run side by side.
 """
 
 from math import expm1, inf
+from typing import TypeAlias
 
 import numpy as np
 from attrs import astuple, evolve, frozen
@@ -155,12 +156,8 @@ class SlowSection:
         return state, result, crept
 
 
-@frozen(eq=False)
-class FilterState:
-    """State of an axis' reference filter: of its creep and of its resonance."""
-
-    creep: float
-    resonance: Array
+FilterState: TypeAlias = tuple[float, Array]
+"""State of an axis' reference filter: of its creep and of its resonance."""
 
 
 class ReferenceFilter:
@@ -172,14 +169,15 @@ class ReferenceFilter:
 
     def at_rest(self) -> FilterState:
         """State before a scan, which begins at zero."""
-        return FilterState(self._creep.at_rest(), self._resonance.at_rest())
+        return self._creep.at_rest(), self._resonance.at_rest()
 
     def apply(self, state: FilterState, block: Array, weights: Array) -> tuple[FilterState, Array]:
         """Adapted reference (n,), m, of a block (n,), m, by ``AxisShift.weights`` (4, n)."""
-        resonance, parts = self._resonance.apply(state.resonance, block)
+        creep, resonance = state
+        resonance, parts = self._resonance.apply(resonance, block)
         adapted = weights[0] * block + weights[1] * parts[0] + weights[2] * parts[1]
-        creep, adapted, _ = self._creep.without(state.creep, adapted, weights[3])
-        return FilterState(creep, resonance), adapted
+        creep, adapted, _ = self._creep.without(creep, adapted, weights[3])
+        return (creep, resonance), adapted
 
 
 @compiled

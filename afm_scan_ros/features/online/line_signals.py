@@ -12,7 +12,7 @@ and P. Stoica, System Identification, 1989, chapter 8).
 """
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
@@ -45,11 +45,8 @@ class LineSignals:
     creep: Array
 
 
-@frozen(eq=False)
-class _AxisState:
-    measured: Array
-    predicted: Array
-    creep: float
+_AxisState: TypeAlias = tuple[Array, Array, float]
+"""State of an axis' filters: of measured and predicted displacement, and of its creep."""
 
 
 class _AxisFilters:
@@ -63,18 +60,19 @@ class _AxisFilters:
 
     def at_rest(self) -> _AxisState:
         still = self._resonance.at_rest()
-        return _AxisState(still, still, self._creep.at_rest())
+        return still, still, self._creep.at_rest()
 
     def apply(
         self, state: _AxisState, measured: Array, predicted: Array, varied: Array
     ) -> tuple[_AxisState, Array]:
         """Rows (8, n): residual, ŷ, filtered y, h, filtered ŷ, z."""
-        of_measured, parts = self._resonance.apply(state.measured, measured)
-        of_predicted, instruments = self._resonance.apply(state.predicted, predicted)
-        creep, _, crept = self._creep.without(state.creep, predicted, np.zeros(len(predicted)))
+        of_measured, of_predicted, creep = state
+        of_measured, parts = self._resonance.apply(of_measured, measured)
+        of_predicted, instruments = self._resonance.apply(of_predicted, predicted)
+        creep, _, crept = self._creep.without(creep, predicted, np.zeros(len(predicted)))
         memory = (varied - predicted) / STEP
         rows = [measured - predicted, predicted, *-parts, memory, *-instruments, crept]
-        return _AxisState(of_measured, of_predicted, creep), np.stack(rows)
+        return (of_measured, of_predicted, creep), np.stack(rows)
 
 
 def _signals(rows: Array) -> LineSignals:

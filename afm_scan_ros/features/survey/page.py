@@ -62,6 +62,12 @@ class Survey:
             found.setdefault(change.instrument, []).append(change)
         return found
 
+    @property
+    def instruments(self) -> Rows:
+        """A row for each instrument."""
+        every = by_instrument(self.recordings)
+        return Rows(SURVEYED, [_instrument_row(name, some, self) for name, some in every])
+
 
 def alert(changes: Sequence[Change]) -> str:
     """Say in a line what changed of an instrument, the surest change first."""
@@ -77,9 +83,7 @@ def alert(changes: Sequence[Change]) -> str:
 
 def summary(found: Survey) -> Iterator[Part]:
     """Yield what was surveyed, and an alert for each instrument that changed."""
-    instruments = list(by_instrument(found.recordings))
-    rows = [_instrument_row(name, some, found) for name, some in instruments]
-    yield Rows(SURVEYED, rows)
+    yield found.instruments
     for each in found.failed:
         yield f"{each.bag} was not diagnosed: {each.error}"
     for each in found.recordings:
@@ -118,7 +122,6 @@ def survey_report(
     models = sorted({each.model for each in recordings})
     changes = [Rows(CHANGES, [_change_row(each) for each in found.changes])]
     listing = Listing(LISTED, [_listed(each, reports) for each in recordings], SHOWN)
-    instruments = [_instrument_row(n, some, found) for n, some in by_instrument(recordings)]
     return ReportPage(
         title="Survey of recordings",
         answer=list(_answer(found)),
@@ -127,7 +130,7 @@ def survey_report(
         evidence=[
             Section("Recordings", [listing], opened=True),
             *([Section("Changes", changes)] if found.changes else []),
-            Section("Instruments", [Rows(SURVEYED, instruments)]),
+            Section("Instruments", [found.instruments]),
             Section("Method", [METHOD.format(found.false_alarm)]),
             Section(
                 "Provenance",

@@ -52,7 +52,7 @@ def show_bag(
 
 def _show_findings(recording: ScanRecording, screen: Screen) -> None:
     """Show the residual of each line, and images, where they were recorded."""
-    for message in (m for file in bag_files(recording.path).files for m in messages(file)):
+    for message in (m for file in bag_files(recording.path)[0] for m in messages(file)):
         if message.type_name == LINE and message.topic.endswith(f"/{RESIDUAL}"):
             screen.line(RESIDUAL, line_of(recording.info, decode(LINE, message.cdr)))
         elif message.type_name == IMAGE and (way := way_of(message.topic)):

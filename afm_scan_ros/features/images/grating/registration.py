@@ -34,7 +34,7 @@ from afm_scan_ros.features.images.grating.rough_motion import (
     with_ripple,
 )
 from afm_scan_ros.features.images.grating.unit_cell import UnitCell, mean_cell
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
 
 JUDGING, TURNS = 20, 120
 """Turns in which damaged cells, noise and smoothness are judged, and most turns in all."""
@@ -103,9 +103,7 @@ def register(image: ScanImage, pitch: float) -> Registration:
 
 def _begun(image: ScanImage, pitch: float) -> tuple["_State", float]:
     """Return the state at a rough motion, and the distance of neighbouring cells, m."""
-    if image.retrace is None:
-        raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
-    recorded = image.trace, image.retrace
+    recorded = both_sides(image)
     given = [levelled(each) for each in recorded]
     first, coefficients, share = first_motion(image, given, pitch)
     places = first.image(0, coefficients)

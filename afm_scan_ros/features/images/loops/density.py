@@ -163,10 +163,6 @@ class NormalEquations:
             self.samples + other.samples,
         )
 
-    def rms(self, weights: Array) -> float:
-        """Root of the mean square, m, that these weights leave."""
-        return float(np.sqrt(self.squares(weights) / self.samples))
-
     def squares(self, weights: Array) -> float:
         """Sum of the squares, m², that these weights leave."""
         return float(self.energy + weights @ (self.gram @ weights - 2.0 * self.moment))
