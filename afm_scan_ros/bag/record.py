@@ -12,7 +12,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.identification.records.recording import kind_and_axes
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import AXES, Array, Trace, channels_of
+from afm_scan_ros.core.types import AXES, Trace, channels_of
 from afm_scan_ros.files.columns import USE, parse_columns, read_table_record
 from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.files.text_table import RowRange
@@ -131,7 +131,8 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
         raise InputError(f"{path}: holds no samples of drive and displacement; {mend}")
     stated_kind, axes = kind_and_axes(info.pattern)
     if not bag.stated:
-        axes = _axes_that_move(drive, displacement)
+        moving = (a for a in AXES if any(np.ptp(trace.axis(a)) for trace in (drive, displacement)))
+        axes = tuple(moving) or AXES
     return Record(
         channels_of(drive, axes),
         channels_of(displacement, axes),
@@ -144,16 +145,6 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
         shortcomings=(*bag.warnings, *_shortcomings(bag, drive)),
         info=info if bag.stated else None,
     )
-
-
-def _axes_that_move(*traces: Trace) -> tuple[str, ...]:
-    """Name the axes that are driven or move; both where none does."""
-    found = (axis for axis in AXES if any(_moves(trace.axis(axis)) for trace in traces))
-    return tuple(found) or AXES
-
-
-def _moves(values: Array) -> bool:
-    return bool(np.ptp(values))
 
 
 def _shortcomings(bag: ScanRecording, drive: Trace) -> list[str]:

@@ -47,10 +47,6 @@ def _nothing(_: yaml.SafeLoader, node: yaml.ScalarNode) -> None:
     raise _Refusal(problem=problem, problem_mark=node.start_mark)
 
 
-def _boolean(_: yaml.SafeLoader, node: yaml.ScalarNode) -> bool:
-    return node.value in _TRUE
-
-
 def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float | str:
     digits = node.value.lstrip("+-")
     if len(digits) > _LONGEST:
@@ -135,20 +131,17 @@ class _Loader(yaml.SafeLoader):
         """Build a mapping whose keys are strings, each given once and with a value."""
         found: dict[str, Any] = {}
         for key, value in node.value:
-            self._check(key, found)
+            if not isinstance(key, yaml.ScalarNode):
+                raise _Refusal(problem="a key must be text", problem_mark=key.start_mark)
+            if key.value in found:
+                problem = f"key '{key.value}' is given twice; keep one"
+                raise _Refusal(problem=problem, problem_mark=key.start_mark)
             found[key.value] = self.construct_object(value, deep=deep)
         return found
 
-    def _check(self, key: yaml.Node, found: Mapping[str, Any]) -> None:
-        if not isinstance(key, yaml.ScalarNode):
-            raise _Refusal(problem="a key must be text", problem_mark=key.start_mark)
-        if key.value in found:
-            problem = f"key '{key.value}' is given twice; keep one"
-            raise _Refusal(problem=problem, problem_mark=key.start_mark)
-
 
 _Loader.add_constructor("tag:yaml.org,2002:null", _nothing)
-_Loader.add_constructor("tag:yaml.org,2002:bool", _boolean)
+_Loader.add_constructor("tag:yaml.org,2002:bool", lambda _, node: node.value in _TRUE)
 _Loader.add_constructor("tag:yaml.org,2002:int", _integer)
 _Loader.add_constructor("tag:yaml.org,2002:float", _double)
 

@@ -1,5 +1,6 @@
 """``afm-scan survey``: diagnoses many recordings, and says which instruments changed and when."""
 
+import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -50,18 +51,14 @@ def _pattern(_: click.Context, __: click.Parameter, given: str | None) -> Patter
 
 @frozen
 class WatchOptions:
-    """How long to wait between looks, s, and how many recordings are enough, if any."""
+    """How long to wait between looks, s, and how many recordings are enough; infinite for none."""
 
     every: float
-    until: int | None
-
-    def go_on(self, count: int) -> bool:
-        """Whether so many recordings are not enough."""
-        return self.until is None or count < self.until
+    until: float
 
 
 def _watching(every: float, until: int | None, *, watch: bool) -> WatchOptions | None:
-    return WatchOptions(every, until) if watch else None
+    return WatchOptions(every, until or math.inf) if watch else None
 
 
 watch_options = grouped(
@@ -224,7 +221,7 @@ def _watched(surveyor: Surveyor, paths: Sequence[Path], options: WatchOptions) -
     found, seen, surveyed = None, set[FoundBag](), set[FoundBag]()
     alerts: set[str] = set()
     with suppress(KeyboardInterrupt):
-        while found is None or options.go_on(len(found.recordings)):
+        while found is None or len(found.recordings) < options.until:
             there = {bag for bag in found_bags(paths) if bag.complete}
             if (steady := there & seen) - surveyed:
                 found, surveyed = surveyor.survey(sorted(steady)), steady
