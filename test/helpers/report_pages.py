@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from attrs import evolve
 
+import afm_scan_ros as afm
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.writer import ScanWriter
 from afm_scan_ros.cli.demo import IMAGED, LINE_RATES, cases, next_commands
@@ -22,7 +23,8 @@ from afm_scan_ros.core.scan_info import info_of_scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.features.images.grating.models import Positions
 from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
-from afm_scan_ros.features.images.report import deviation_picture, grating_report, grating_table
+from afm_scan_ros.features.images.identify import ImageIdentification
+from afm_scan_ros.features.images.report import grating_report, grating_table
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.features.learning.loop import learn
 from afm_scan_ros.features.learning.report import learning_report
@@ -144,11 +146,12 @@ def of_grating() -> ReportPage:
 
     before, after = imaged(bend, -bend), imaged(0.0 * bend, 0.0 * bend)
     moved = [np.stack([x + shift - size / 2, y - size / 2], axis=2) for shift in (bend, -bend)]
-    positions = [Positions(moved[0], moved[1], np.full(x.shape, 1e-9))]
-    figures = [[ImageQuantity("loop width", "x", "%", 2.5, 2.4, 2.6)]]
-    table = grating_table([before], positions, figures, [], [])
-    deviation = deviation_picture([before], positions)
-    return grating_report(table, [before], [after], deviation, ["x: known."], ["Record one."])
+    positions = Positions(moved[0], moved[1], np.full(x.shape, 1e-9))
+    figures = (ImageQuantity("loop width", "x", "%", 2.5, 2.4, 2.6),)
+    found = ImageIdentification(
+        afm.load_model(), (before,), (positions,), (after,), (figures,), drift=()
+    )
+    return grating_report(found, grating_table(found), ["x: known."], ["Record one."])
 
 
 def recordings(count: int, instruments: int) -> list[Recording]:

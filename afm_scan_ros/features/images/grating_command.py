@@ -15,7 +15,6 @@ from afm_scan_ros.features.images.files.formats import WRITTEN, read_image, writ
 from afm_scan_ros.features.images.identify import ACCURACY, correct_image, identify_from_images
 from afm_scan_ros.features.images.report import (
     correction_picture,
-    deviation_picture,
     grating_report,
     grating_table,
     left_out,
@@ -105,13 +104,11 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
     with working("grating", at_once=False) as progress:
         found = identify_from_images(given, pitch, volts_per_metre, progress, 0.01 * accuracy)
     found.model.save(out)
-    used = found.images
-    table = grating_table(used, found.positions, found.figures, found.drift, found.refused)
+    table = grating_table(found)
     table.show()
-    effects = found.model.effects["x"]
-    known = list(_known(effects, "µm commanded" if scale is None else "V"))
-    known += left_out(used, found.positions)
-    advice = [*not_separated(used, effects), *(f"Not used: {each}." for each in found.refused)]
+    known = list(_known(found.model.effects["x"], "µm commanded" if scale is None else "V"))
+    known += left_out(found)
+    advice = [*not_separated(found), *(f"Not used: {each}." for each in found.refused)]
     for sentence in (*known, *advice):
         say(sentence)
     coupled = ", with half the angle in each axis" if found.model.scanner.axis("x").added else ""
@@ -125,13 +122,11 @@ def grating(  # noqa: PLR0913, PLR0917 - click hands over one parameter an optio
         }
         again = correction_of_another(images, pitch, out, options)
         with working("writing the report", at_once=False):
-            deviation = deviation_picture(used, found.positions)
-            pages = grating_report(table, used, found.corrected, deviation, known, [*advice, again])
-            pages.write(report, figures)
+            grating_report(found, table, known, [*advice, again]).write(report, figures)
     if folder is not None:
         table.save(folder)
         with working("writing the images", at_once=False):
-            for image, better in zip(used, found.corrected, strict=True):
+            for image, better in zip(found.images, found.corrected, strict=True):
                 _write_corrected(targets[given.index(image)], image, better)
             for target, image in zip(targets[len(given) :], others, strict=True):
                 _write_corrected(target, image, correct_image(found.model, image, volts_per_metre))

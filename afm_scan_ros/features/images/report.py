@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from afm_scan_ros.core.model import BaseEffects, Status
+from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.types import AXES, Array
 from afm_scan_ros.features.images.grating.features import levelled
 from afm_scan_ros.features.images.grating.models import APART, Positions
 from afm_scan_ros.features.images.grating.motion import middles
-from afm_scan_ros.features.images.grating.registered_image import ImageQuantity
 from afm_scan_ros.features.images.grating.rough_motion import FINEST
+from afm_scan_ros.features.images.identify import ImageIdentification
 from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
 from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.paper import paper_figure
@@ -51,37 +51,29 @@ SIDES = *WAYS, "trace minus retrace"
 X = "x in µm"
 
 
-def grating_table(
-    images: Sequence[ScanImage],
-    positions: Sequence[Positions],
-    figures: Sequence[Sequence[ImageQuantity]],
-    drift: Sequence[ImageQuantity],
-    refused: Sequence[str],
-) -> Table:
+def grating_table(found: ImageIdentification) -> Table:
     """Return the figures of each image, and of both directions; its picture shows deviations.
 
-    Lengths in % are of the commanded range. The title names each image that was ``refused``, and
-    why.
+    Lengths in % are of the commanded range. The title names each image that was refused, and why.
     """
-    names = [Path(image.name).name for image in images]
-    pairs = [*zip(names, figures, strict=True), (TOGETHER, drift)]
+    names = [Path(image.name).name for image in found.images]
+    pairs = [*zip(names, found.figures, strict=True), (TOGETHER, found.drift)]
     rows = [
         {"image": name, "figure": each.name, **{key: getattr(each, key) for key in KEPT}}
         for name, every in pairs
         for each in every
     ]
     title = "What the images show of the scanner"
-    if refused:
-        title += f" (not used: {'; '.join(refused)})"
-    return Table(
-        "grating", title, COLUMNS, rows, lambda: paper_figure(deviation_picture(images, positions))
-    )
+    if found.refused:
+        title += f" (not used: {'; '.join(found.refused)})"
+    deviation = deviation_picture(found.images, found.positions)
+    return Table("grating", title, COLUMNS, rows, lambda: paper_figure(deviation))
 
 
-def left_out(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Iterator[str]:
+def left_out(found: ImageIdentification) -> Iterator[str]:
     """Yield which lines of each image are not known, beside the one scanned first."""
-    for image, found in zip(images, positions, strict=True):
-        count = image.lines - len(found.trace[found.known])
+    for image, positions in zip(found.images, found.positions, strict=True):
+        count = image.lines - len(positions.trace[positions.known])
         if count > 1:
             yield (
                 f"{Path(image.name).name}: no edge shows y in the {count} lines scanned first, just"
@@ -89,8 +81,9 @@ def left_out(images: Sequence[ScanImage], positions: Sequence[Positions]) -> Ite
             )
 
 
-def not_separated(images: Sequence[ScanImage], x: BaseEffects) -> Iterator[str]:
+def not_separated(found: ImageIdentification) -> Iterator[str]:
     """Yield what the images cannot separate, and the image to record next."""
+    images, x = found.images, found.model.effects["x"]
     rates = [1.0 / image.line_time for image in images if image.line_time]
     slowest, fastest = min(rates), max(rates)
     if fastest < APART * slowest:
@@ -175,19 +168,18 @@ def correction_picture(before: ScanImage, after: ScanImage) -> Picture:
 
 
 def grating_report(
+    found: ImageIdentification,
     table: Table,
-    images: Sequence[ScanImage],
-    corrected: Sequence[ScanImage | None],
-    deviation: Picture,
     known: Sequence[str],
     advice: Sequence[str | CommandLine],
 ) -> ReportPage:
-    """Return the report on a scanner identified from ``images``.
+    """Return the report on a scanner identified from images.
 
     ``known`` says what the model holds, ``advice`` what the images cannot tell, which can, and what
     to do next.
     """
-    pairs = [(a, b) for a, b in zip(images, corrected, strict=True) if b is not None]
+    pairs = [(a, b) for a, b in zip(found.images, found.corrected, strict=True) if b is not None]
+    deviation = deviation_picture(found.images, found.positions)
     pictures = [*(correction_picture(a, b) for a, b in pairs), deviation]
     return ReportPage(
         title="A scanner identified from images of a grating",

@@ -41,7 +41,7 @@ def test_the_other_images_are_used() -> None:
     (reason,) = found.refused
     assert reason.startswith("noise.npz: ")
     assert np.array_equal(found.positions[0].trace, alone.positions[0].trace)
-    shown = grating_table(found.images, found.positions, found.figures, found.drift, found.refused)
+    shown = grating_table(found)
     assert reason in shown.title
     assert alone.refused == ()
 
