@@ -4,12 +4,7 @@ from pathlib import Path
 
 import click
 
-from afm_scan_ros.cli.driving import (
-    DrivenScanner,
-    PlannedCalibration,
-    driven_options,
-    run_calibration,
-)
+from afm_scan_ros.cli import driving
 from afm_scan_ros.cli.options import FILE, FOLDER, grouped, positive
 from afm_scan_ros.cli.plan import PlanOptions, export, plan_options
 from afm_scan_ros.cli.scanner import SIM
@@ -87,7 +82,7 @@ PURPOSES = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENT
 
 
 @click.command(epilog="\n\n".join(("Experiments:", *PURPOSES)))
-@driven_options
+@driving.driven_options
 @click.option(
     "--out",
     type=FOLDER,
@@ -117,7 +112,7 @@ PURPOSES = (f"  {name}: {experiment.purpose}" for name, experiment in EXPERIMENT
 )
 @experiment_options
 def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an option
-    driven: DrivenScanner,
+    driven: driving.DrivenScanner,
     out: Path | None,
     experiment: tuple[str | None, Size],
     folder: Path | None,
@@ -147,14 +142,14 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         motion = MotionLimits.of_range(scan_range, travel, excitation)
         converter = wanted.converter_for(known, limits)
         have = combined([wanted.covered, *([known_from(known)] if known else [])])
-        planned = PlannedCalibration(
+        planned = driving.PlannedCalibration(
             driven, out, converter, limits, motion, scan_range, wanted.hold, have
         )
         bags = [*wanted.have, *planned.run()]
         advice = f"afm-scan identify {' '.join(map(str, bags))} --out model.yaml"
     else:
         plans = _default_drives(driven.scanner, name, known, size, wanted.rate)
-        run_calibration(driven, out, plans)
+        driving.run_calibration(driven, out, plans)
         advice = _next(out, name)
     of = driven.scanner
     recorded = f"the simulated scanner of {driven.plant}" if of == SIM else f"scanner {of}"

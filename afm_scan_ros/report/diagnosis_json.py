@@ -21,13 +21,8 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.metrics import Tracking, plain
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
+from afm_scan_ros.report import diagnosis_text
 from afm_scan_ros.report.close_loop import reported
-from afm_scan_ros.report.diagnosis_text import (
-    caution_text,
-    evidence_text,
-    next_experiment,
-    why_not_text,
-)
 from afm_scan_ros.report.residual import initial_state_text
 
 Document = dict[str, Any]
@@ -67,9 +62,9 @@ def diagnosis_document(found: ScannerDiagnosis) -> Document:
         "effects": [_effect(effect) for effect in found.effects],
         "alternatives": [_alternative(each) for each in found.alternatives],
         "probabilities": found.probabilities,
-        "next_experiment": next_experiment(found),
+        "next_experiment": diagnosis_text.next_experiment(found),
         "proposed_experiment": found.proposal and _proposal(found.proposal),
-        "cautions": [caution_text(each) for each in found.cautions],
+        "cautions": [diagnosis_text.caution_text(each) for each in found.cautions],
         "tracking_rms_before_m": None,
         "tracking_rms_after_m": None,
     }
@@ -93,7 +88,7 @@ def _effect(effect: IdentifiedEffect) -> Document:
         },
         "probability": effect.probability,
         "explained_fraction": effect.explained_fraction,
-        "evidence": list(evidence_text(effect)),
+        "evidence": list(diagnosis_text.evidence_text(effect)),
     }
 
 
@@ -105,7 +100,7 @@ def _alternative(other: Alternative) -> Document:
         "axis": other.axis,
         "score": other.score,
         "probability": None if math.isnan(other.probability) else other.probability,
-        "why_not": why_not_text(other),
+        "why_not": diagnosis_text.why_not_text(other),
     }
 
 

@@ -2,13 +2,8 @@
 
 from collections.abc import Sequence
 
+from afm_scan_ros.core.identification.drives import growth
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.growth import (
-    GrowthStep,
-    MeasuredResponse,
-    Reached,
-    Watched,
-)
 from afm_scan_ros.core.identification.drives.proposal import ProposedRecord
 from afm_scan_ros.report.table import Row, Table
 
@@ -107,7 +102,7 @@ GROWTH = {
 }
 
 
-def step_text(name: str, number: int, planned: float, watched: Watched) -> str:
+def step_text(name: str, number: int, planned: float, watched: growth.Watched) -> str:
     """One line on a step; ``planned`` is the planned amplitude in V."""
     share = watched.step.share
     what = "record" if watched.step.whole else f"step {number}"
@@ -115,7 +110,7 @@ def step_text(name: str, number: int, planned: float, watched: Watched) -> str:
     return f"{name}, {what}: {share:.1%} of the plan, {share * planned:.3g} V: {axes}"
 
 
-def _axis_text(axis: str, seen: MeasuredResponse) -> str:
+def _axis_text(axis: str, seen: growth.MeasuredResponse) -> str:
     return (
         f"{axis} moved {1e6 * seen.travel:.3g} µm, {1e6 * seen.gain:.3g} µm/V, fast peak"
         f" {1e6 * seen.peak:.2g} µm of {1e6 * seen.steady:.2g} µm steady"
@@ -130,14 +125,14 @@ def slope_text(name: str, share: float, steepest: float, limit: float) -> str:
     )
 
 
-def kept_text(name: str, step: GrowthStep) -> str:
+def kept_text(name: str, step: growth.GrowthStep) -> str:
     """State how large the record is, and why it is no larger."""
     if step.reached is None:
         return f"{name}: recorded as planned"
     return f"{name}: recorded with {step.share:.1%} of the planned voltage. {_why(step.reached)}"
 
 
-def _why(reached: Reached) -> str:
+def _why(reached: growth.Reached) -> str:
     expected, limit = 1e6 * reached.expected, 1e6 * reached.limit
     at = f"At {reached.share:.1%}"
     if reached.quantity == "travel":
@@ -148,7 +143,7 @@ def _why(reached: Reached) -> str:
     )
 
 
-def growth_row(name: str, planned: float, last: Watched) -> Row:
+def growth_row(name: str, planned: float, last: growth.Watched) -> Row:
     """Row of a record; ``planned`` is its planned amplitude in V."""
     x, y = last.responses["x"], last.responses["y"]
     reached = last.step.reached

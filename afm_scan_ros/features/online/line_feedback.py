@@ -23,12 +23,8 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import DRIVE, ErrorLines, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.features.online import line_correction
 from afm_scan_ros.features.online.extrapolation import Extrapolation
-from afm_scan_ros.features.online.line_correction import (
-    LineCorrection,
-    lines_of_delay,
-    refuse_unsuited,
-)
 from afm_scan_ros.nodes.parameters import NodeParameter, OnlineOption
 
 OFFSET_X, TILT_X, GAIN_X, OFFSET_Y, TILT_Y = range(5)
@@ -42,7 +38,7 @@ class LineFit:
     """Fits the coefficients to the error of a line; raises InputError for a scan without them."""
 
     def __init__(self, spec: ScanSpec) -> None:
-        refuse_unsuited("line feedback", spec)
+        line_correction.refuse_unsuited("line feedback", spec)
         start, size = phases(spec).lines.start, spec.samples_per_line
         kinds = sample_kinds(spec, start, size)
         time = np.arange(size) / size
@@ -68,7 +64,7 @@ def _solver(basis: Array) -> Array:
     return np.asarray(np.linalg.pinv(basis.T), dtype=np.float64)
 
 
-class FedBack(LineCorrection):
+class FedBack(line_correction.LineCorrection):
     """Adds the corrections of lines, which follow from the errors of those before, to a reference.
 
     On the constant-speed parts of a line its correction is ``offset + tilt t + gain x_d / range``.
@@ -126,7 +122,7 @@ class FedBack(LineCorrection):
 
 def fed_back(_: ScannerModel, spec: ScanSpec, held_back: int, latency: float) -> FedBack:
     """Return the line feedback of a scan; raises InputError for a scan that it does not suit."""
-    return FedBack(spec, lines_of_delay(spec, held_back, latency))
+    return FedBack(spec, line_correction.lines_of_delay(spec, held_back, latency))
 
 
 def _paths(correction: Array, time: Array, shape: Array) -> tuple[Array, Array]:
@@ -144,6 +140,6 @@ LINE_FEEDBACK = OnlineOption(
             description="Whether offset, tilt and gain are corrected from the last lines",
         ),
     ),
-    refuse_unsuited=partial(refuse_unsuited, "line feedback"),
+    refuse_unsuited=partial(line_correction.refuse_unsuited, "line feedback"),
     correction=lambda _: fed_back,
 )

@@ -11,18 +11,8 @@ from numpy.typing import NDArray
 
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
 from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
+from afm_scan_ros.report import picture
 from afm_scan_ros.report.page import CommandLine, Listing, ReportPage, Section
-from afm_scan_ros.report.picture import (
-    BLUE,
-    LIGHT_BLUE,
-    ORANGE,
-    Bars,
-    Curve,
-    Mark,
-    Panel,
-    Picture,
-    Stretches,
-)
 from afm_scan_ros.report.provenance import UNSTATED
 from afm_scan_ros.report.quantity import nanometres, quantity, significant
 from afm_scan_ros.report.scan_pictures import LOW
@@ -195,7 +185,7 @@ def _listed(each: Recording, reports: Mapping[str, str]) -> list[str | float]:
     ]
 
 
-def _trends(found: Survey) -> Picture | None:
+def _trends(found: Survey) -> picture.Picture | None:
     """Show the trends of an instrument, one that changed if any did; None where there are none."""
     series = {name: courses(some) for name, some in by_instrument(found.recordings)}
     known = {name: each for name, each in series.items() if each}
@@ -217,7 +207,7 @@ def _trends(found: Survey) -> Picture | None:
         " scan share. The grey line is the model, or the detection limit. Orange is the time of a"
         " change (95 % credible interval)."
     )
-    return Picture("trends", caption, variants[ordered[0]], LOW, variants=variants)
+    return picture.Picture("trends", caption, variants[ordered[0]], LOW, variants=variants)
 
 
 def _instrument_row(name: str, some: Sequence[Recording], found: Survey) -> tuple[str, ...]:
@@ -256,7 +246,7 @@ def _time(stamp: int) -> str:
 
 def _trend(
     series: dict[tuple[str, str], Course], found: Survey, instrument: str, axis: str, name: str
-) -> Panel:
+) -> picture.Panel:
     """Show a quantity of an axis of an instrument over time; nothing where it is not determined."""
     course = series.get((axis, name), [])
     times = _dates(*(recording.recorded for recording, _ in course))
@@ -268,15 +258,15 @@ def _trend(
         for each in found.changed.get(instrument, [])
         if (each.axis, each.name) == (axis, name)
     ]
-    marks: list[Mark] = [
-        Stretches(changed, "", ORANGE),
-        Bars(times, whole[:, 0], whole[:, 1], "", LIGHT_BLUE),
-        Bars(times, values / noise, values * noise, "", BLUE, 2.0),
-        Curve(times, values, "", BLUE, dots=True),
+    marks: list[picture.Mark] = [
+        picture.Stretches(changed, "", picture.ORANGE),
+        picture.Bars(times, whole[:, 0], whole[:, 1], "", picture.LIGHT_BLUE),
+        picture.Bars(times, values / noise, values * noise, "", picture.BLUE, 2.0),
+        picture.Curve(times, values, "", picture.BLUE, dots=True),
     ]
     over = "over its limit" if name == RESIDUAL else "over the model's"
     title = QUANTITIES[name].format(axis)
-    return Panel(marks, "time", over, title, level=1.0, dates=True)
+    return picture.Panel(marks, "time", over, title, level=1.0, dates=True)
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:
