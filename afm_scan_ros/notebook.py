@@ -14,8 +14,8 @@ from PIL import Image
 
 from afm_scan_ros.core.types import ProgressCallback
 from afm_scan_ros.progress import timed
-from afm_scan_ros.report.html import page
 from afm_scan_ros.report.interactive import drawn
+from afm_scan_ros.report.page import filled
 from afm_scan_ros.report.paper import paper_figure
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE, Curve, Map, Panel, Picture
 
@@ -55,7 +55,7 @@ def html_of(picture: Picture) -> str:
     fewer = Image.open(raw).convert("RGB").quantize(128, method=Image.Quantize.FASTOCTREE)
     fewer.save(still, format="png", optimize=True)
     image = b64encode(still.getvalue()).decode()
-    return page("notebook.html", of=picture, drawn=drawn([picture]), still=image)
+    return filled("notebook.html", of=picture, drawn=drawn([picture]), still=image)
 
 
 @cache

@@ -1,4 +1,7 @@
-"""What a report says, in the order in which it is read: the answer, what to do next, evidence."""
+"""What a report says, in the order in which it is read: the answer, what to do next, evidence.
+
+Pages are self-contained HTML from templates, in which no text is markup.
+"""
 
 import shlex
 from collections.abc import Sequence
@@ -6,12 +9,33 @@ from pathlib import Path
 from typing import TypeAlias
 
 from attrs import frozen
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from afm_scan_ros.files.paths import write_text
-from afm_scan_ros.report import html
 from afm_scan_ros.report.picture import Picture
 from afm_scan_ros.report.provenance import SOURCE, Provenance
 from afm_scan_ros.report.table import Rows
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def filled(name: str, folder: Path = TEMPLATES, **values: object) -> str:
+    """Return a template of a folder filled with values; it may extend those of this package.
+
+    Each text among the values is escaped. A value that a template names and that is not given is
+    an error.
+    """
+    templates = Environment(
+        loader=FileSystemLoader([folder, TEMPLATES]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    templates.tests["kind"] = lambda part, name: type(part).__name__ == name
+    templates.filters["zip"] = zip
+    return templates.get_template(name).render(values)
 
 
 @frozen
@@ -96,7 +120,7 @@ class ReportPage:
         """Return the report as one HTML page that needs nothing else."""
         from afm_scan_ros.report.interactive import drawn  # noqa: PLC0415 - a page alone needs it
 
-        return html.page("report.html", report=self, drawn=drawn(self.pictures))
+        return filled("report.html", report=self, drawn=drawn(self.pictures))
 
     def write(self, file: Path, figures: str | None) -> None:
         """Write the page, and beside it each picture as a file of a format, if one is named."""

@@ -10,9 +10,8 @@ from jinja2 import UndefinedError
 from setuptools import Distribution, find_namespace_packages
 from setuptools.command.build_py import build_py
 
-from afm_scan_ros.report import html
 from afm_scan_ros.report.interactive import drawn
-from afm_scan_ros.report.page import CommandLine, Listing, PageLink
+from afm_scan_ros.report.page import CommandLine, Listing, PageLink, filled
 from afm_scan_ros.report.picture import Curve, Panel, Picture
 from afm_scan_ros.report.table import Rows
 
@@ -40,7 +39,7 @@ def test_no_text_is_markup(every_part: Path) -> None:
         rows = Rows((text,), [(text,)], text)
         panel = Panel([Curve(np.arange(2.0), np.arange(2.0), text)], text, text, text)
         picture = Picture("one", text, [[panel]], variants={text: [[panel]]})
-        return html.page(
+        return filled(
             "every_part.html",
             every_part,
             text=text,
@@ -69,7 +68,7 @@ def test_no_template_calls_a_text_markup(template: Path) -> None:
 
 def test_a_value_that_is_missing_is_an_error(every_part: Path) -> None:
     with pytest.raises(UndefinedError, match="rows"):
-        html.page("every_part.html", every_part, text="", drawn=None)
+        filled("every_part.html", every_part, text="", drawn=None)
 
 
 def test_a_wheel_holds_every_template(monkeypatch: pytest.MonkeyPatch) -> None:

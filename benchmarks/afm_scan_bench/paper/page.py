@@ -10,7 +10,7 @@ from attrs import asdict
 from matplotlib.figure import Figure
 
 from afm_scan_bench.paper.section import Section
-from afm_scan_ros.report import html
+from afm_scan_ros.report.page import filled
 from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Rows
 
@@ -29,7 +29,7 @@ def page(sections: Iterable[Section]) -> str:
         }
         for each in sections
     ]
-    return html.page("paper.html", Path(__file__).parent / "templates", sections=parts)
+    return filled("paper.html", Path(__file__).parent / "templates", sections=parts)
 
 
 @styled

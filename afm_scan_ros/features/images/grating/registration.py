@@ -26,14 +26,13 @@ from afm_scan_ros.features.images.grating.equations import (
     Smoothing,
 )
 from afm_scan_ros.features.images.grating.features import levelled
-from afm_scan_ros.features.images.grating.motion import MotionForm
+from afm_scan_ros.features.images.grating.motion import MotionForm, UnitCell, mean_cell
 from afm_scan_ros.features.images.grating.rough_motion import (
     NORMAL,
     carried_over,
     first_motion,
     with_ripple,
 )
-from afm_scan_ros.features.images.grating.unit_cell import UnitCell, mean_cell
 from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
 
 JUDGING, TURNS = 20, 120

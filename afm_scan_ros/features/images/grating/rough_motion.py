@@ -24,11 +24,11 @@ from afm_scan_ros.features.images.grating.features import (
 from afm_scan_ros.features.images.grating.motion import (
     MotionForm,
     Ripple,
+    UnitCell,
     middles,
     since_turn,
     spline_basis,
 )
-from afm_scan_ros.features.images.grating.unit_cell import UnitCell
 from afm_scan_ros.features.images.scan_image import ScanImage
 
 ROUGH = 2
