@@ -3,7 +3,7 @@
 from typing import TypeVar
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.optimize import least_squares
@@ -174,7 +174,8 @@ def fitted_shift(
     width = 2.0 * damping * resonance / frequencies[1]
     size = max(1, int(min(width / FINEST, spacing)))
     near, part = _grouped(frequencies[used], size), _Shown.of(error.at(used), size)
-    ringing = _Ringing.of(vibration, near, resonance, part, spacing / size)
+    ringing = _ringing(vibration, near, resonance, part, spacing / size)
+    start = np.zeros(3) if ringing is None else np.append(np.zeros(3), ringing.start)
     bounds = np.log([[p.lower, p.upper] for p in (*GAIN, *RESONANCE)]).T
     spread = (bounds[1] - bounds[0]) / 4.0
     weight = np.sqrt(part.precision)
@@ -182,15 +183,14 @@ def fitted_shift(
     def residual(values: Array) -> Array:
         shifted = _shifted(resonance, damping, values[:3], near) - 1.0
         left = weight * (part.ratio - shifted)
-        return np.concatenate(
-            (left.real, left.imag, values[:3] / spread, ringing.residual(shifted, values[3:]))
-        )
+        parts = [left.real, left.imag, values[:3] / spread]
+        if ringing is not None:
+            parts.append(ringing.residual(shifted, values[3:]))
+        return np.concatenate(parts)
 
-    free = np.full(ringing.unknowns, np.inf)
+    free = np.full(len(start) - 3, np.inf)
     limits = np.append(bounds[0], -free), np.append(bounds[1], free)
-    best = least_squares(
-        residual, np.append(np.zeros(3), ringing.start), bounds=limits, loss="soft_l1"
-    )
+    best = least_squares(residual, start, bounds=limits, loss="soft_l1")
     covariance = np.linalg.inv(best.jac.T @ best.jac)[:3, :3]
     return Shift(resonance, damping, best.x[:3], covariance)
 
@@ -248,59 +248,43 @@ class _Ringing:
     """The error's power at each harmonic of the line rate, as the scanner's response shapes it.
 
     Behind the response it is a power law of the frequency, whose two unknowns are fitted too.
-    Nothing where there are fewer harmonics than ``LEAST_HARMONICS``.
+    Harmonics are groups of frequencies, each of a ``width`` from its ``first`` one on.
     """
 
     first: NDArray[np.int64]
     width: NDArray[np.int64]
-    error: Array
     gain: Array
     part: _Shown
     slope: Array
 
-    @classmethod
-    def of(
-        cls,
-        vibration: VibrationModel,
-        frequencies: Array,
-        resonance: float,
-        part: _Shown,
-        spacing: float,
-    ) -> "_Ringing":
-        """Take the error's mean power around each harmonic."""
-        count = int(len(frequencies) / max(spacing, 1.0))
-        edges = np.linspace(0, len(frequencies), count + 1).astype(np.int64)
-        if count < LEAST_HARMONICS:
-            edges = np.zeros(1, np.int64)
-        gain = np.abs(vibration.response(2.0 * np.pi * frequencies) / vibration.static_gain) ** 2
-        first, width = edges[:-1], np.diff(edges)
-        found = cls(first, width, np.empty(0), gain, part, np.log(frequencies / resonance))
-        return evolve(found, error=found._mean(part.power))
-
     @property
-    def unknowns(self) -> int:
-        """Parameters of the power law that are fitted."""
-        return 2 if len(self.first) else 0
+    def error(self) -> Array:
+        """The error's mean power around each harmonic."""
+        return self._mean(self.part.power)
 
     @property
     def start(self) -> Array:
         """First values of the unknowns."""
-        if not len(self.first):
-            return np.empty(0)
         return np.array([np.log(self.error.mean() / self.gain.mean()), 0.0])
 
     def residual(self, shifted: Spectrum, law: Array) -> Array:
         """Logarithm of the power over that expected, in standard deviations of one harmonic's."""
-        if not len(self.first):
-            return np.empty(0)
         excited = np.exp(law[0] + law[1] * self.slope) * self.gain * np.abs(1.0 + shifted) ** 2
         moved = np.abs(shifted) ** 2 * self.part.motion
         expected = self._mean(excited + moved + self.part.noise)
         return np.asarray((np.log(self.error / expected) + EULER) / LOG_SPREAD)
 
     def _mean(self, power: Array) -> Array:
-        return (
-            np.asarray(np.add.reduceat(power, self.first) / self.width)
-            if len(self.first)
-            else power[:0]
-        )
+        return np.asarray(np.add.reduceat(power, self.first) / self.width)
+
+
+def _ringing(
+    vibration: VibrationModel, frequencies: Array, resonance: float, part: _Shown, spacing: float
+) -> _Ringing | None:
+    """Return what the harmonics show; None of fewer than ``LEAST_HARMONICS``."""
+    count = int(len(frequencies) / max(spacing, 1.0))
+    if count < LEAST_HARMONICS:
+        return None
+    edges = np.linspace(0, len(frequencies), count + 1).astype(np.int64)
+    gain = np.abs(vibration.response(2.0 * np.pi * frequencies) / vibration.static_gain) ** 2
+    return _Ringing(edges[:-1], np.diff(edges), gain, part, np.log(frequencies / resonance))
