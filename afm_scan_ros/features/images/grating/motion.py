@@ -11,6 +11,7 @@ line rings after each turn: f then has a damped oscillation as well. Its amplitu
 how they change along the line, are coefficients of each direction.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -275,22 +276,32 @@ class UnitCell:
         )
 
 
-def mean_cell(u: Array, v: Array, heights: Array, weights: Array, size: int) -> UnitCell:
-    """Weighted mean of heights (n,) at coordinates in cells (n,), on a grid of ``size`` a side.
+def mean_cell(
+    form: MotionForm,
+    coefficients: Array,
+    heights: Sequence[Array],
+    weights: Sequence[Array],
+    size: int,
+) -> UnitCell:
+    """Weighted mean of the heights of each direction at a motion, on a grid of ``size`` a side.
 
     Each height is shared by the four nearest points; points that none is near take the mean of
     those around them.
     """
     total, weight = np.zeros(size * size), np.zeros(size * size)
-    row, column = (u % 1.0) * size, (v % 1.0) * size
+    where = [
+        form.image(direction, coefficients).reshape(-1, 2) for direction in range(len(heights))
+    ]
+    row, column = (np.concatenate(where).T % 1.0) * size
+    seen, counted = (np.concatenate([each.ravel() for each in v]) for v in (heights, weights))
     i, j = np.floor(row).astype(int), np.floor(column).astype(int)
     down, right = row - i, column - j
     corners = (((1 - down), 0), (down, 1)), (((1 - right), 0), (right, 1))
     for share_i, step_i in corners[0]:
         for share_j, step_j in corners[1]:
             index = ((i + step_i) % size) * size + (j + step_j) % size
-            share = share_i * share_j * weights
-            total += np.bincount(index, share * heights, size * size)
+            share = share_i * share_j * counted
+            total += np.bincount(index, share * seen, size * size)
             weight += np.bincount(index, share, size * size)
     return UnitCell.of(_filled(total.reshape(size, size), weight.reshape(size, size)))
 

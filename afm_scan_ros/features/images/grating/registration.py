@@ -173,7 +173,7 @@ class _State:
         even = [np.ones_like(each) for each in heights]
         for each in even:
             each[first] = 0.0
-        cell = _mean_cell(form, coefficients, heights, even, size)
+        cell = mean_cell(form, coefficients, heights, even, size)
         return cls(form, coefficients, recorded, heights, even, even, size, cell)
 
     def by_columns(self) -> "_State":
@@ -181,7 +181,7 @@ class _State:
         state = self
         for _ in range(COLUMNS):
             form, moved = with_ripple(state.form, state.coefficients, self.heights, state.cell)
-            cell = _mean_cell(form, moved, self.heights, self.weights, self.size)
+            cell = mean_cell(form, moved, self.heights, self.weights, self.size)
             state = evolve(state, form=form, coefficients=moved, cell=cell)
         return state
 
@@ -190,7 +190,7 @@ class _State:
         form = evolve(self.form, ripple=None)
         kept = [self.coefficients[self.form.smooth_part(direction)] for direction in range(2)]
         moved = np.vstack([*kept, self.coefficients[2 * self.form.fast :]])
-        cell = _mean_cell(form, moved, self.heights, self.weights, self.size)
+        cell = mean_cell(form, moved, self.heights, self.weights, self.size)
         return evolve(self, form=form, coefficients=moved, cell=cell)
 
     def mean_miss(self) -> float:
@@ -241,7 +241,7 @@ class _State:
             )
         ]
         coefficients = self.coefficients + step
-        cell = _mean_cell(self.form, coefficients, heights, weights, self.size)
+        cell = mean_cell(self.form, coefficients, heights, weights, self.size)
         return evolve(
             self,
             coefficients=coefficients,
@@ -355,23 +355,3 @@ def _background(residual: Array, where: Missed, weight: Array) -> Array:
     moment = np.einsum("lp,ilp->li", weight * residual, terms)
     factors = np.linalg.solve(gram, moment[..., np.newaxis])[..., 0]
     return np.asarray(np.einsum("li,ilp->lp", factors, terms))
-
-
-def _mean_cell(
-    form: MotionForm,
-    coefficients: Array,
-    heights: Sequence[Array],
-    weights: Sequence[Array],
-    size: int,
-) -> UnitCell:
-    where = [
-        form.image(direction, coefficients).reshape(-1, 2) for direction in range(len(heights))
-    ]
-    u, v = np.concatenate(where).T
-    return mean_cell(
-        u,
-        v,
-        np.concatenate([h.ravel() for h in heights]),
-        np.concatenate([w.ravel() for w in weights]),
-        size,
-    )
