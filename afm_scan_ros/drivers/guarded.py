@@ -165,7 +165,9 @@ class GuardedDriver:
         """
         self._refuse(drive)
         self._before = {axis: float(drive.axis(axis)[-1]) for axis in AXES}
-        answer = self._answer(held_after(drive, self.latency_samples) if last else drive)
+        whole = held_after(drive, self.latency_samples) if last else drive
+        answer = checked(self._driver.advance(whole), whole, knows_true=self.knows_true)
+        self._watch.check(whole, answer.sensor)
         read, true = self._dated(answer.sensor), self._dated(answer.true) if answer.true else None
         self._next_sample += read.x.size
         self._early -= answer.sensor.x.size - read.x.size
@@ -186,11 +188,6 @@ class GuardedDriver:
 
     def _refuse(self, drive: Trace) -> None:
         self._settings.amplifier.limits.refuse_beyond(drive, self._before)
-
-    def _answer(self, drive: Trace) -> Reading:
-        answer = checked(self._driver.advance(drive), drive, knows_true=self.knows_true)
-        self._watch.check(drive, answer.sensor)
-        return answer
 
     def _dated(self, late: Trace) -> Trace:
         """Return readings as of the samples of their displacement, without those before it."""

@@ -7,7 +7,7 @@ what it takes from the other. What they have in common is the scanner's: its sca
 hysteresis, and its angle.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -282,10 +282,6 @@ def _motion(
     cosine, sine = np.swapaxes(along / np.linalg.norm(along, axis=1, keepdims=True), 0, 1)
     turn = np.stack([np.hstack([cosine, -sine]), np.hstack([sine, cosine])], axis=1)
     there, back, up = (registration.pitch * each @ turn for each in (trace, retrace, rows))
-    x, y = (0.5 * span * middles(n) for span, n in _sides(image))
+    x = 0.5 * image.range_x * middles(image.pixels)
+    y = 0.5 * image.range_y * middles(image.lines)
     return _Motion(there, back, up, x, y[known])
-
-
-def _sides(image: ScanImage) -> Iterator[tuple[float, int]]:
-    yield image.range_x, image.pixels
-    yield image.range_y, image.lines

@@ -112,11 +112,8 @@ def _relative(form: MotionForm, places: Array) -> tuple[Array, Array]:
 
 def carried_over(rough: MotionForm, coefficients: Array, form: MotionForm) -> Array:
     """Coefficients of a motion in another form."""
-    grid = np.meshgrid(middles(33), middles(33), indexing="ij")
-    line, pixel = (each.ravel() for each in grid)
-    basis = np.vstack([form.rows(d, line, pixel) for d in range(2)])
-    known = np.vstack([rough.rows(d, line, pixel) @ coefficients for d in range(2)])
-    return _solved(form, basis, known)
+    known = np.vstack([rough.coarse(d) @ coefficients for d in range(2)])
+    return _solved(form, np.vstack([form.coarse(d) for d in range(2)]), known)
 
 
 def _best_shifts(where: Array, along: Array, seen: Array, cell: UnitCell) -> tuple[Array, Array]:
