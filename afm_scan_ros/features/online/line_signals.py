@@ -1,6 +1,6 @@
 """What one line shows of a shift: the residual and each unknown's part in it, per axis.
 
-With y measured, ŷ predicted by the model from the drive, and filters as in axis_shift.py,
+With y measured, ŷ predicted by the model from the drive, and filters as in adapted_reference.py,
 
     y - ŷ = (g - 1) ŷ - a (s²/N) y - b (2 ζ ω s/N) y + η h + c z + the model's error + noise.
 
