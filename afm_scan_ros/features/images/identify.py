@@ -20,7 +20,7 @@ from afm_scan_ros.features.images.grating.registered_image import (
     register_image,
 )
 from afm_scan_ros.features.images.positions import common_rectangle, predicted_positions, regridded
-from afm_scan_ros.features.images.scan_image import ScanImage, both_sides
+from afm_scan_ros.features.images.scan_image import ScanImage, both_sides, line_time_of
 from afm_scan_ros.model import Model
 
 ACCURACY = 0.0035
@@ -118,10 +118,7 @@ def identify_from_images(
     scales = _scales(volts_per_metre)
     for image in given:
         both_sides(image)
-        if image.line_time is None:
-            raise InputError(
-                f"{image.name}: the time of a line is not known: give line_time, or --line-time"
-            )
+        line_time_of(image)
     seen, errors = _registered(given, pitch, report)
     used, inaccurate = accurate_ones(seen, accuracy)
     errors += inaccurate

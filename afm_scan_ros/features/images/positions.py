@@ -12,7 +12,7 @@ from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.motion import middles
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, line_time_of
 
 PER_PIXEL = 8
 """Samples of a pixel: a drive that is held for one of them lags little behind the line."""
@@ -87,11 +87,10 @@ def predicted_positions(
     no axis moves the other. Raises InputError where the time of a line is not known, or where the
     drive leaves the range of the model.
     """
-    if image.line_time is None:
-        raise InputError(f"{image.name}: the time of a line is not known: state it")
-    line = LineDrive.of(image, volts_per_metre[0], image.line_time)
+    line_time = line_time_of(image)
+    line = LineDrive.of(image, volts_per_metre[0], line_time)
     there, back = line.at_pixels(_moved(model.axis("x"), line.drive, line.sample_period))
-    rows = _rows(model, image, volts_per_metre[1], image.line_time)
+    rows = _rows(model, image, volts_per_metre[1], line_time)
     middle = 0.5 * (there.mean() + back.mean())
     both = (np.broadcast_to(each - middle, image.trace.shape) for each in (there, back))
     y = np.broadcast_to((rows - rows.mean())[:, np.newaxis], image.trace.shape)

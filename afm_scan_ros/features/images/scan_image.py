@@ -103,3 +103,12 @@ def both_sides(image: ScanImage) -> tuple[Array, Array]:
     if image.retrace is None:
         raise InputError(f"{image.name}: holds no retrace: give an image of both directions")
     return image.trace, image.retrace
+
+
+def line_time_of(image: ScanImage) -> float:
+    """Return the time of trace and retrace together; raises InputError where it is not known."""
+    if image.line_time is None:
+        raise InputError(
+            f"{image.name}: the time of a line is not known: give line_time, or --line-time"
+        )
+    return image.line_time

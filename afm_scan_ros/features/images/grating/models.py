@@ -43,7 +43,7 @@ from afm_scan_ros.features.images.loops.fit import (
 from afm_scan_ros.features.images.loops.moving import MovingRecord, swept
 from afm_scan_ros.features.images.loops.search import NO_CREEP, at_once
 from afm_scan_ros.features.images.positions import LineDrive, rows_of
-from afm_scan_ros.features.images.scan_image import ScanImage
+from afm_scan_ros.features.images.scan_image import ScanImage, line_time_of
 
 APART = 2.0
 """Ratio of line rates from which on they show what depends on the rate."""
@@ -122,12 +122,7 @@ def model_of(
 
 def _record(image: ScanImage, positions: Positions, scale: float) -> MovingRecord:
     """Return the mean to-and-fro line of an image, several times."""
-    if image.line_time is None:
-        raise InputError(
-            f"{image.name}: a model needs the time of a line: give an image that holds it, or the"
-            " time"
-        )
-    line = LineDrive.of(image, scale, image.line_time)
+    line = LineDrive.of(image, scale, line_time_of(image))
     there, back = (each[..., 0].mean(axis=0) for each in (positions.trace, positions.retrace))
     moved = line.moved(there, back)
     name = f"x of {image.name}"
