@@ -34,6 +34,10 @@ from afm_scan_ros.report.provenance import UNSTATED, source_of
 from afm_scan_ros.report.terminal import say
 
 TEXT, NETCDF = ".csv", ".nc"
+PIXELS = 256
+STREAMS = ("desired_displacement", "achieved_displacement")
+"""What images of errors and positions need."""
+TOPOGRAPHY = "Topography"
 SIGNALS = {
     "desired_displacement": ("desired", "m"),
     "achieved_displacement": ("achieved", "m"),
@@ -171,12 +175,6 @@ def _say(
         say(f"{files[0]} holds {names}: {lines} lines of {pixels} pixels.")
     if signals:
         say(f"{files[0]} holds {len(signals[0].values)} samples of each signal.")
-
-
-PIXELS = 256
-STREAMS = ("desired_displacement", "achieved_displacement")
-"""What images of errors and positions need."""
-TOPOGRAPHY = "Topography"
 
 
 def scan_channels(
