@@ -134,11 +134,7 @@ def _with_hysteresis(
 ) -> AxisModel:
     """Identify x, and what follows its hysteresis where the line ``rates`` (Hz) differ."""
     slowest, fastest = rates
-    shortest = min(record.sample_period for record in records)
-    if fastest >= APART * slowest:
-        joint = fit_jointly(records, None, None, progress)
-    else:
-        joint = fit_jointly(records, at_once(1.0, shortest), NO_CREEP, progress)
+    joint = fit_jointly(records, progress, at_rates=fastest >= APART * slowest)
     hysteresis, vibration = _of_better_form(records, joint)
     drive = joint.grid.lower, joint.grid.upper
     known = EffectStatus(drive=drive, frequencies=rates)

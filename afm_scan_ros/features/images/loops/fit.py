@@ -10,8 +10,6 @@ from operator import add
 import numpy as np
 from attrs import frozen
 
-from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
 from afm_scan_ros.features.images.loops import moving
@@ -44,7 +42,7 @@ class JointFit:
     """Weights (m) of the cells of a grid, under a smoothing, and what follows the hysteresis.
 
     ``vibration`` and ``creep`` hold the intervals of what was sought and identified of them; None
-    where the records do not identify it, or where it was known.
+    where it was not sought, or the records do not identify it.
     """
 
     weights: Array
@@ -56,27 +54,24 @@ class JointFit:
 
 
 def fit_jointly(
-    records: Sequence[MovingRecord],
-    vibration: VibrationModel | None,
-    creep: CreepModel | None,
-    progress: ProgressCallback,
+    records: Sequence[MovingRecord], progress: ProgressCallback, *, at_rates: bool
 ) -> JointFit:
-    """Fit all records; the vibration (of gain 1 at rest) and the creep are sought where None.
+    """Fit the hysteresis of all records; ``at_rates``, also what follows it: vibration and creep.
 
     Where a resonance ripples, no lag is sought beside it. Raises ScanError where a search does not
     converge.
     """
     grids = [list(swept(records, grid_of(records, cells))) for cells in (COARSE, FINER)]
-    still = at_once(1.0, min(record.sample_period for record in records))
-    ripple = None
-    if vibration is None:
+    shortest = min(record.sample_period for record in records)
+    known, ripple = LinearDynamics(at_once(1.0, shortest), NO_CREEP), None
+    forms: list[Form] = []
+    if at_rates:
         progress("seeking a resonance")
-        ripple = rippling(grids[0], WEAK_SMOOTHING, LinearDynamics(still, NO_CREEP))
-        vibration = None if ripple is None else ripple.dynamics.vibration
+        ripple = rippling(grids[0], WEAK_SMOOTHING, known)
+        known = known if ripple is None else ripple.dynamics
+        forms = [*([Lag(records)] if ripple is None else []), OneCreep(records)]
     progress("seeking what follows the hysteresis")
-    forms: list[Form] = [Lag(records)] if vibration is None else []
-    forms += [OneCreep(records)] if creep is None else []
-    forms, found = _sought(grids, LinearDynamics(vibration or still, creep or NO_CREEP), forms)
+    forms, found = _sought(grids, known, forms)
     intervals = dict(zip(map(type, forms), found.intervals, strict=True))
     folds = _folds(grids[0], found.dynamics)
     smoothing = min(SMOOTHINGS, key=lambda choice: _crossed(folds, choice))
