@@ -187,7 +187,9 @@ class Model:
             those found, which varies along the drive, and the error that is left on records, over
             their motion. A model that states no ``spread`` has the rms error that its records
             foresee of such motion. Beyond the identified range it also holds how far the
-            prediction is from a straight line there. Only where ``return_std``.
+            prediction is from a straight line there. It is about the mean where no identified
+            record began at rest, since none tells how far motion lies from there. Only where
+            ``return_std``.
 
         Raises
         ------

@@ -63,13 +63,15 @@ def apart(
 ) -> Array:
     """What a standard deviation in each direction adds to a prediction (m), (directions, n).
 
-    Effects that were added to the axis are left out: they change it by far less than it is.
+    Effects that were added to the axis are left out: they change it by far less than it is. Where
+    no record tells how far the motion lies from rest, it is about the mean.
     """
     given = drive, sample_period, share, intersample
     middle = _moved(axis, spread.centre, *given)
-    return np.array(
+    each = np.array(
         [(_moved(axis, one, *given) - middle) / one.deviations for one in spread.directions]
     ).reshape(-1, len(drive))
+    return each if spread.of_rest else each - each.mean(axis=1, keepdims=True)
 
 
 def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:

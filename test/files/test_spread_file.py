@@ -73,6 +73,20 @@ def test_a_loaded_model_is_as_uncertain(tmp_path: Path, *, duhem: bool) -> None:
     assert np.ptp(after[1]) > 0.1 * after[1].max()
 
 
+def test_what_no_record_tells_of_rest_is_not_uncertain(tmp_path: Path) -> None:
+    one = variant(0.0, 0.0, duhem=False)
+    offset = evolve(one, deviations=1.0, forward=evolve(one.forward, offset=one.forward.offset + 1))
+    axis = model(duhem=False).axis("y")
+    stated = []
+    for of_rest in (True, False):
+        spread = Spread(one, (offset,), (0.0, 500.0), (0.0,), of_rest=of_rest)
+        save_model(tmp_path / "model.yaml", ScannerModel(y=evolve(axis, spread=spread)), "a model")
+        loaded = afm.load_model(tmp_path / "model.yaml")
+        stated.append(loaded.predict(DRIVE, PERIOD, return_std=True)[1][100:])
+    assert stated[0].min() > 1e-6
+    assert stated[1].max() < 0.3 * stated[0].min()
+
+
 def test_how_uncertain_a_model_is_does_not_tell_it_from_another() -> None:
     given = model(duhem=False)
     silent = ScannerModel(y=evolve(given.axis("y"), spread=None))

@@ -85,15 +85,17 @@ def from_rest(fit: AxisFit, drive: Array, period: float) -> Simulation:
 
 
 def _products(fit: AxisFit, drive: Array, period: float) -> Array:
-    """JᵀJ of a drive (V) from depolarised rest, which counts as known where no record rested."""
+    """JᵀJ of a drive (V) from rest, or of its last cycle about the mean where no record rested."""
     simulation = from_rest(fit, drive, period)
     operator, edges = fit.layout.operator, simulation.record.edges
     start, _ = fit.layout.at_rest(simulation.theta)
     pieces = operator.pieces(fit.layout.of_operator(fit.theta), drive, edges, start)
     rows = np.concatenate([one for _, one in jacobian(simulation, pieces)])
-    rows -= rows[0].copy()
-    if not any(one.rested for one in fit.records):
-        rows[:, fit.layout.parts["rest"]] = 0.0
+    if any(one.rested for one in fit.records):
+        rows -= rows[0].copy()
+    else:
+        rows = rows[-fit.layout.settings.scan_samples :]
+        rows -= rows.mean(axis=0)
     return np.asarray(rows.T @ rows)
 
 
