@@ -50,9 +50,9 @@ def test_amplitude_and_length_are_as_asked(tmp_path: Path, model: list[str]) -> 
     arguments = ["--experiment", "broadband", *size, "--export", str(tmp_path), *model]
     done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
     assert done.exit_code == 0, done.output
-    drive = np.load(tmp_path / "broadband.npz")
-    assert np.abs(drive["drive_v"]).max() == pytest.approx(0.8)
-    assert len(drive["drive_v"]) * drive["sample_period_s"] == pytest.approx(1.1)
+    with np.load(tmp_path / "broadband.npz") as drive:
+        assert np.abs(drive["drive_v"]).max() == pytest.approx(0.8)
+        assert len(drive["drive_v"]) * drive["sample_period_s"] == pytest.approx(1.1)
 
 
 def test_a_simulated_scanner_is_driven_as_asked(tmp_path: Path) -> None:
@@ -161,7 +161,8 @@ def test_a_drive_is_exported_at_the_rate_of_a_converter(tmp_path: Path) -> None:
     arguments = ["--experiment", "broadband", "--export", str(tmp_path), "--rate", "10kHz"]
     done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
     assert done.exit_code == 0, done.output
-    assert np.load(tmp_path / "broadband.npz")["sample_period_s"] == pytest.approx(1e-4)
+    with np.load(tmp_path / "broadband.npz") as drive:
+        assert drive["sample_period_s"] == pytest.approx(1e-4)
     assert "10000 samples a second" in (tmp_path / "README.md").read_text("utf-8")
 
 
