@@ -135,13 +135,19 @@ class NodeProcess:
         return Ended(self.name, self.process.returncode, self.last_words(), traceback)
 
     def last_words(self) -> str:
-        """Return its last line of output, or the signal that killed it."""
-        status = self.process.returncode
-        lines = reversed(self._written().split("\n"))
-        message = next((_LOGGED.sub("", line) for line in lines if line.strip()), "")
+        """Return its last line of output, or the signal that killed it.
+
+        What it says by name counts more than what the system says of a crash thereafter.
+        """
+        status, begun = self.process.returncode, f"{self.name}: "
+        written = reversed(self._written().split("\n"))
+        lines = [_LOGGED.sub("", line) for line in written if line.strip()]
+        own = [line for line in lines if line.startswith(begun)]
+        if own:
+            return own[0]
         if status < 0:
-            return f"{self.name}: killed by {signal.Signals(-status).name}"
-        return message if message.startswith(f"{self.name}: ") else f"{self.name}: {message}"
+            return f"{begun}killed by {signal.Signals(-status).name}"
+        return begun + (lines[0] if lines else "")
 
     def _written(self) -> str:
         self.output.seek(0)

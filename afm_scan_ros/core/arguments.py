@@ -44,6 +44,7 @@ def samples(what: str, given: ArrayLike) -> Array:
         array = np.asarray(given)
     except ValueError as error:
         raise InputError(f"{what} is no array: {error}") from error
+    refuse_masked(what, given)
     if array.dtype.kind not in "fiu":
         raise InputError(f"{what} is of type {array.dtype}: give real numbers, as float64")
     if array.ndim not in (1, 2) or not array.size:
@@ -57,6 +58,16 @@ def samples(what: str, given: ArrayLike) -> Array:
             " finite numbers"
         )
     return values
+
+
+def refuse_masked(what: str, given: ArrayLike) -> None:
+    """Raise InputError for a masked array that lacks a value: what lies under a mask is none."""
+    if np.ma.is_masked(given):
+        place = tuple(int(k) for k in np.argwhere(np.ma.getmaskarray(np.ma.asarray(given)))[0])
+        raise InputError(
+            f"{what} is masked at {place[0] if len(place) == 1 else place}: give the part without"
+            " gaps, or fill them"
+        )
 
 
 def positive(name: str, given: object, fix: str) -> float:

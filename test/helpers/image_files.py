@@ -18,7 +18,7 @@ STEP = 2.0**-32
 
 @frozen(eq=False)
 class Scan:
-    """An image pair and how it was scanned: m, s."""
+    """An image pair and how it was scanned: m, s, and degrees from the scanner's x to the lines."""
 
     trace: Image
     retrace: Image
@@ -26,6 +26,7 @@ class Scan:
     range_y: float
     line_time: float
     upward: bool
+    angle: float = 0.0
 
 
 def write_nid(path: Path, scan: Scan) -> None:
@@ -74,6 +75,7 @@ def write_sxm(path: Path, scan: Scan) -> None:
         *(":NANONIS_VERSION:", "2", ":SCANIT_TYPE:", "FLOAT            MSBFIRST"),
         *(":SCAN_PIXELS:", f"{pixels} {lines}", ":SCAN_TIME:", f"{times[0]!r} {times[1]!r}"),
         *(":SCAN_RANGE:", f"{scan.range_x!r} {scan.range_y!r}"),
+        *(":SCAN_ANGLE:", f"{scan.angle:.3E}"),
         *(":SCAN_DIR:", "up" if scan.upward else "down", ":DATA_INFO:"),
         "\tChannel\tName\tUnit\tDirection\tCalibration\tOffset",
         *("\t0\tCurrent\tA\tboth\t1\t0", "\t14\tZ\tm\tboth\t1\t0", "", ":SCANIT_END:"),
@@ -92,6 +94,7 @@ def write_spm(path: Path, scan: Scan) -> None:
     head = [
         *(r"\*File list", r"\*Scanner list", rf"\@Sens. Zsens: V {sensitivity!r} nm/V"),
         *(r"\*Ciao scan list", rf"\Scan Rate: {1.0 / scan.line_time!r}"),
+        rf"\Rotate Ang.: {scan.angle!r}",
     ]
     size = 2 * lines * pixels
     for number, way in enumerate(("Trace", "Retrace")):
@@ -121,6 +124,7 @@ def write_ibw(path: Path, scan: Scan) -> None:
     note = (
         f"ScanSize: 1\rFastScanSize: {scan.range_x!r}\rSlowScanSize: {scan.range_y!r}\r"
         f"ScanRate: {1.0 / scan.line_time!r}\rScanDown: {0 if scan.upward else 1}\r"
+        f"ScanAngle: {scan.angle!r}\r"
     ).encode("latin-1")
     labels = b"".join(t.ljust(32, b"\0") for t in (b"", b"HeightTrace", b"HeightRetrace"))
     sizes = (0, len(note), 0, *(0,) * 4, 0, 0, len(labels), 0, 0, 0, 0)

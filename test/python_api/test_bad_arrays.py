@@ -21,6 +21,10 @@ def record(**changed: Any) -> afm.Record:  # noqa: ANN401 - whatever may be wron
 
 BAD_RECORDS: dict[str, tuple[dict[str, Any], str]] = {
     "NaN": ({"drive": NAN}, r"drive is nan at sample 1, channel 0"),
+    "masked": (
+        {"displacement": np.ma.masked_greater(5e-6 * GOOD, 4e-6)},
+        "displacement is masked at 40: give the part without gaps",
+    ),
     "infinite": ({"displacement": np.full(50, np.inf)}, "displacement is inf at sample 0"),
     "unequal": ({"displacement": GOOD[:-1]}, "drive has 50 samples and displacement 49"),
     "more channels than axes": (

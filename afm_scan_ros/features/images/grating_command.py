@@ -6,7 +6,15 @@ from pathlib import Path
 import click
 from attrs import evolve
 
-from afm_scan_ros.cli.options import FIGURES, FILE, FOLDER, NEW_FILE, positive, refuse_existing
+from afm_scan_ros.cli.options import (
+    FIGURES,
+    FILE,
+    FOLDER,
+    NEW_FILE,
+    positive,
+    refuse_existing,
+    warn,
+)
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import BaseEffects
@@ -154,8 +162,9 @@ def _known(effects: BaseEffects, drive: str) -> Iterator[str]:
 
 
 def _timed(path: Path, line_time: float | None) -> ScanImage:
-    """Read an image; a ``line_time`` (s) is for a file that states none."""
+    """Read an image, and warn of what it assumes; ``line_time`` (s) is for a file without one."""
     found = read_image(path)
+    warn(found.assumptions)
     if line_time is None:
         return found
     if found.line_time is not None:

@@ -6,6 +6,7 @@ import numpy as np
 from attrs import field, frozen
 from attrs.converters import optional
 
+from afm_scan_ros.core.arguments import refuse_masked
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
@@ -14,6 +15,7 @@ SMALLEST = 8
 
 
 def _floats(values: Array) -> Array:
+    refuse_masked("an image", values)
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):

@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -60,6 +61,31 @@ def test_an_image_is_what_was_scanned(
     assert image.overscan == pytest.approx(0.05 if suffix == ".nid" else 0.0)
     stated = "states no overscan" in " ".join(image.assumptions)
     assert stated == (suffix != ".nid")
+
+
+@pytest.mark.parametrize("suffix", [".sxm", ".spm", ".ibw"])
+@pytest.mark.parametrize("angle", [30.0, -90.0, 180.0])
+def test_rotated_lines_are_told(tmp_path: Path, suffix: str, angle: float) -> None:
+    path = tmp_path / f"scan{suffix}"
+    WRITERS[suffix](path, evolve(pair(1, 9, 11), angle=angle))
+    told = f"its lines are rotated by {angle:g}° from the scanner's x"
+    assert told in " ".join(read_image(path).assumptions)
+
+
+@pytest.mark.parametrize(("angle", "told"), [(6.0, False), (7.0, True)])
+def test_a_rotation_that_stays_within_a_line_is_none(
+    tmp_path: Path, angle: float, *, told: bool
+) -> None:
+    """Of nine lines in a square, a line at 6° rises by 0.94 of their distance."""
+    path, scan = tmp_path / "scan.sxm", evolve(pair(1, 9, 11), range_x=1e-6, range_y=1e-6)
+    WRITERS[".sxm"](path, evolve(scan, angle=angle))
+    assert ("rotated" in " ".join(read_image(path).assumptions)) is told
+
+
+def test_a_trace_that_is_not_as_long_as_its_retrace_is_told(tmp_path: Path) -> None:
+    WRITERS[".sxm"](tmp_path / "scan.sxm", pair(1, 9, 11))
+    told = "its trace takes 25 % of the time of a line, its retrace the rest: both are taken as"
+    assert told in " ".join(read_image(tmp_path / "scan.sxm").assumptions)
 
 
 @pytest.mark.parametrize(("suffix", "channel"), [(".spm", "Height"), (".ibw", "HeightTrace")])
@@ -218,7 +244,8 @@ def test_images_of_nanosurf(name: str) -> None:
     assert (image.channel, image.pixels, image.upward) == (channel, pixels, upward)
     found = (image.range_x, image.range_y, image.line_time, image.overscan)
     assert found == pytest.approx((size, size, line_time, overscan))
-    assert image.assumptions == ()
+    rotated = "its lines are rotated" in " ".join(image.assumptions)
+    assert (len(image.assumptions), rotated) == ((0, False) if name == "MoS2" else (1, True))
 
 
 @pytest.mark.parametrize("name", ["circles", "squares_holes", "grid"])

@@ -35,7 +35,9 @@ UPWARD = {"up": True, "down": False}
 class ScanFacts:
     """How a channel was scanned: ranges in m, the time of trace and retrace together in s.
 
-    ``overscan`` is a share of the range at each end. None stands for what a file does not state.
+    ``overscan`` is a share of the range at each end, ``angle`` (degrees) is from the scanner's x to
+    the lines, and ``trace_share`` that of the trace in ``line_time``, where it is not half. None
+    stands for what a file does not state.
     """
 
     range_x: float
@@ -43,6 +45,8 @@ class ScanFacts:
     line_time: float | None = None
     upward: bool | None = None
     overscan: float | None = None
+    angle: float = 0.0
+    trace_share: float | None = None
 
 
 @frozen(eq=False)
@@ -110,7 +114,11 @@ def _unit(sides: Sides) -> str:
 
 
 def image_of(path: Path, sides: Sides) -> ScanImage:
-    """Return the image of a channel, lengths in m; raises InputError where its trace is missing."""
+    """Return the image of a channel, lengths in m.
+
+    It assumes no rotation, and says so where a line passes into the next one by it: then both axes
+    of the scanner move along a line. Raises InputError where the trace is missing.
+    """
     if False not in sides:
         raise InputError(
             f"{path}: holds only the retrace of '{sides[True].name}': save its trace as well"
@@ -122,6 +130,17 @@ def image_of(path: Path, sides: Sides) -> ScanImage:
         assumptions.append(f"{path}: states no slow direction: it is taken as scanned upward")
     if facts.overscan is None:
         assumptions.append(f"{path}: states no overscan: it is taken as none")
+    along, across = np.cos(np.radians(facts.angle)), np.sin(np.radians(facts.angle))
+    if along < 0.0 or abs(across) * facts.range_x * len(trace.values) > facts.range_y:
+        assumptions.append(
+            f"{path}: its lines are rotated by {facts.angle:g}° from the scanner's x: x and y are"
+            " taken along and across the lines, not as the scanner's axes"
+        )
+    if facts.trace_share is not None:
+        assumptions.append(
+            f"{path}: its trace takes {100.0 * facts.trace_share:.3g} % of the time of a line, its"
+            " retrace the rest: both are taken as equally long"
+        )
     return ScanImage(
         _in_si(trace),
         None if retrace is None else _in_si(retrace),

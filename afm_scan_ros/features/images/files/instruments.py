@@ -34,6 +34,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.features.images.files.channels import (
@@ -48,6 +49,7 @@ from afm_scan_ros.files.units import A_NUMBER
 SPM_END = re.compile(rb"^\\\*File list end\s*$", re.MULTILINE)
 """The header's last line."""
 SCAN_RATE = re.compile(rf"\\Scan Rate: ({A_NUMBER})".encode())
+ROTATED = re.compile(rf"\\Rotate Ang\.: ({A_NUMBER})".encode())
 TITLE = re.compile(r'.*"([^"]*)"')
 LENGTH = b"Data length"
 """Bytes of a channel, which lie nowhere else."""
@@ -64,6 +66,8 @@ def read_spm(spm: ModuleType, path: Path) -> Iterator[Direction]:
         raise InputError("has no end of a Nanoscope header, it was cut short: copy it again")
     rate = SCAN_RATE.search(content, 0, end.start())
     line_time = None if rate is None else 1.0 / float(rate[1])
+    rotated = ROTATED.search(content, 0, end.start())
+    angle = 0.0 if rotated is None else float(rotated[1])
     scan = spm.Bruker(str(path))
     stated = sum(int(layer.get(LENGTH, [b"0"])[0]) for layer in scan.layers)
     if stated > len(content):
@@ -81,17 +85,18 @@ def read_spm(spm: ModuleType, path: Path) -> Iterator[Direction]:
                 " image"
             )
         values = np.asarray(image.pixels, dtype=float)
-        yield Direction(name, back, image.zscale, _spm_facts(layer, line_time), values)
+        facts = evolve(_spm_facts(layer), line_time=line_time, angle=angle)
+        yield Direction(name, back, image.zscale, facts, values)
 
 
-def _spm_facts(layer: Layer, line_time: float | None) -> ScanFacts:
+def _spm_facts(layer: Layer) -> ScanFacts:
     size, _, unit = _text(layer, "Scan Size").split()
     width, colon, height = _text(layer, "Aspect Ratio").partition(":")
     if not colon:
         height, width = _text(layer, "Number of lines"), _text(layer, "Samps/line")
     range_x = metres("Scan Size", float(size), unit.replace("~", "u"))
     upward = UPWARD.get(_text(layer, "Frame direction").lower())
-    return ScanFacts(range_x, range_x * float(height) / float(width), line_time, upward)
+    return ScanFacts(range_x, range_x * float(height) / float(width), upward=upward)
 
 
 def _text(layer: Layer, name: str) -> str:
@@ -145,9 +150,13 @@ def _sxm_facts(header: Mapping[str, Sequence[Sequence[str]]]) -> ScanFacts:
     if direction not in UPWARD:
         raise InputError(f"SCAN_DIR is '{direction}': give an image scanned up or down")
     range_x, range_y = (float(word) for word in header["SCAN_RANGE"][0][:2])
+    angle = float(header["SCAN_ANGLE"][0][0]) if "SCAN_ANGLE" in header else 0.0
+    facts = ScanFacts(range_x, range_y, upward=UPWARD[direction], angle=angle)
     times = [float(word) for word in header["SCAN_TIME"][0]] if "SCAN_TIME" in header else []
-    line_time = sum(times) if len(times) == 2 else None  # noqa: PLR2004 - forward and backward
-    return ScanFacts(range_x, range_y, line_time, UPWARD[direction])
+    if len(times) != 2 or not sum(times) > 0.0:  # noqa: PLR2004 - forward and backward
+        return facts
+    share = times[0] / sum(times) if times[0] != times[1] else None
+    return evolve(facts, line_time=sum(times), trace_share=share)
 
 
 STACK = 3
@@ -193,6 +202,7 @@ def _ibw_facts(note: str) -> ScanFacts:
         float(stated["SlowScanSize"]),
         1.0 / float(stated["ScanRate"]) if "ScanRate" in stated else None,
         SCAN_DOWN.get(stated.get("ScanDown", "")),
+        angle=float(stated.get("ScanAngle", 0.0)),
     )
 
 

@@ -31,6 +31,8 @@ DATA_MARK = b"\r\n#!"
 QUANTITY = re.compile(rf"({A_NUMBER})\s*(\S*)")
 VECTOR = re.compile(r"[DV]\[([^],]*)(?:,[^]]*)?\]\*\[([^],]*)(?:,[^]]*)?\]")
 PERCENT = {"%": 0.01}
+DEGREES = {"°": 1.0, "Â°": 1.0}
+"""The second is UTF-8 that NSFopen takes for Latin-1."""
 IMAGING = "DataSet\\Parameters\\Imaging"
 
 Sections = Mapping[str, Mapping[str, str]]
@@ -111,6 +113,7 @@ def _facts(header: Sections, section: Mapping[str, str]) -> ScanFacts:
         None if one_way is None else 2.0 * one_way,
         UPWARD.get(info.get("Scan direction", "").lower()),
         _number(imaging.get("OverScanSize") or info.get("Overscan", ""), PERCENT),
+        _number(imaging.get("Rotation") or info.get("Rotation", ""), DEGREES) or 0.0,
     )
 
 
