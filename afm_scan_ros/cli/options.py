@@ -93,6 +93,15 @@ def refuse_existing(*paths: Path, other: str = "folder") -> None:
             raise InputError(f"{path} exists already: give another {other} or remove it")
 
 
+def refuse_over(recording: Path, *targets: Path | None) -> None:
+    """Raise InputError for the first target that would overwrite a recording, or a file of it."""
+    for target in targets:
+        if target is None or not target.exists():
+            continue
+        if target.resolve().is_relative_to(recording.resolve()):
+            raise InputError(f"{target} belongs to the recording {recording}: give another file")
+
+
 def warn(texts: Iterable[str]) -> None:
     """Write each text as a warning on stderr."""
     for text in texts:

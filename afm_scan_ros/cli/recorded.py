@@ -49,6 +49,7 @@ def analyze(
     """Compare desired with achieved displacement in BAG, a rosbag2 folder or an .mcap file."""
     if figures is not None and report is None:
         raise click.UsageError("--figures are written beside a report: give --report")
+    options.refuse_over(bag, json_file, report, figure)
     with working("analysing", at_once=False):
         recording = read_scan(bag, topics)
         alone = comparable(recording) and report is None and figure is None

@@ -71,7 +71,7 @@ def apart(
     each = np.array(
         [(_moved(axis, one, *given) - middle) / one.deviations for one in spread.directions]
     ).reshape(-1, len(drive))
-    return each if spread.of_rest else each - each.mean(axis=1, keepdims=True)
+    return each if spread.rest_known else each - each.mean(axis=1, keepdims=True)
 
 
 def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:

@@ -42,16 +42,16 @@ class Spread:
 
     The surfaces of ``centre`` and variants are coarser than the model's own: only differences
     between them count. ``bands`` are the n + 1 edges (Hz) of n bands, of one share (1) each.
-    Unless some record was ``of_rest``, none tells how far motion lies from there, and differences
-    count about their mean. Raises InputError where bands and shares do not pair, these are no
-    shares, or a direction is none.
+    Unless ``rest_known``, no record began at rest and tells how far motion lies from there, and
+    differences count about their mean. Raises InputError where bands and shares do not pair, these
+    are no shares, or a direction is none.
     """
 
     centre: Variant
     directions: tuple[Variant, ...]
     bands: tuple[float, ...] = field(converter=floats)
     shares: tuple[float, ...] = field(converter=floats)
-    of_rest: bool = True
+    rest_known: bool = True
 
     def __attrs_post_init__(self) -> None:
         if not all(low < high < float("inf") for low, high in pairwise(self.bands)):

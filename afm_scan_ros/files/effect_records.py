@@ -202,7 +202,7 @@ class SpreadRecord:
     directions: str
     bands: tuple[float, ...] = field(metadata={"suffix": "_hz"})
     shares: tuple[float, ...]
-    of_rest: bool = True
+    rest_known: bool = True
 
 
 def spread_from(given: SpreadRecord, sensitivity: float, arrays: Archive) -> Spread:
@@ -224,7 +224,7 @@ def spread_from(given: SpreadRecord, sensitivity: float, arrays: Archive) -> Spr
         )
     with naming("directions"):
         directions = tuple(_like(centre, iter(row)) for row in rows)
-    return Spread(centre, directions, given.bands, given.shares, given.of_rest)
+    return Spread(centre, directions, given.bands, given.shares, given.rest_known)
 
 
 def spread_to(of: Spread, axis: str, arrays: Arrays) -> SpreadRecord:
@@ -241,7 +241,7 @@ def spread_to(of: Spread, axis: str, arrays: Arrays) -> SpreadRecord:
     )
     rows = [numbers_of(each) for each in of.directions]
     arrays[f"{name}_directions"] = np.reshape(rows, (len(rows), len(numbers_of(one))))
-    return SpreadRecord(centre, f"{name}_directions", of.bands, of.shares, of.of_rest)
+    return SpreadRecord(centre, f"{name}_directions", of.bands, of.shares, of.rest_known)
 
 
 def numbers_of(value: Any) -> Array:  # noqa: ANN401 - a record or numbers

@@ -125,14 +125,14 @@ def _run(node: ScanNode, caught: list[str]) -> int:
     try:
         live(node, executor, caught)
     finally:
-        node.closed = partial(_closed, node, name)
+        node.on_closed = partial(_say_end, node, name)
         executor.shutdown()
         node.destroy_node()
     return node.status
 
 
-def _closed(node: ScanNode, name: str) -> None:
-    """Say how the node ended, and see that leaving ROS changes nothing of it."""
+def _say_end(node: ScanNode, name: str) -> None:
+    """Write how the node ended, and keep its status whatever happens while it leaves ROS."""
     end_within(node.safety.leaving, _ended(name, node.reason, node.status))
 
 

@@ -71,7 +71,7 @@ class ScanNode(Node, ABC):
         self.reason = "waits for scan_info"
         self.next_sample = 0
         self.status = 0
-        self.closed: Callable[[], None] = lambda: None
+        self.on_closed: Callable[[], None] = lambda: None
         self.ready = False
         self._reported = 0
         self._logged = ""
@@ -356,7 +356,7 @@ class ScanNode(Node, ABC):
         if self._heartbeat.is_alive():
             self._heartbeat.join()
         self._readers.clear()
-        self.closed()  # hardware and bag are, and it remains to leave ROS
+        self.on_closed()  # hardware and bag are closed; what remains is to leave ROS
         super().destroy_node()
 
     def _log_news(self) -> None:

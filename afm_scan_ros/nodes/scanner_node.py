@@ -196,7 +196,8 @@ class ScannerNode(ManagedConsumer):
         answer = self._driver.answer(wait)
         if answer is None:
             if (late := time.monotonic() - self._asked) > self._longest_pause():
-                self.reason = f"the driver has not answered for {late:.2g} s"
+                late_by = f"the driver has not answered for {late:.2g} s"
+                self.reason = f"{late_by}, and the drive may not be at rest"
             return
         self.reason = ""
         moved, self._moving = self._moving, []

@@ -73,13 +73,13 @@ def test_a_loaded_model_is_as_uncertain(tmp_path: Path, *, duhem: bool) -> None:
     assert np.ptp(after[1]) > 0.1 * after[1].max()
 
 
-def test_what_no_record_tells_of_rest_is_not_uncertain(tmp_path: Path) -> None:
+def test_where_rest_is_unknown_an_offset_adds_no_uncertainty(tmp_path: Path) -> None:
     one = variant(0.0, 0.0, duhem=False)
     offset = evolve(one, deviations=1.0, forward=evolve(one.forward, offset=one.forward.offset + 1))
     axis = model(duhem=False).axis("y")
     stated = []
-    for of_rest in (True, False):
-        spread = Spread(one, (offset,), (0.0, 500.0), (0.0,), of_rest=of_rest)
+    for rest_known in (True, False):
+        spread = Spread(one, (offset,), (0.0, 500.0), (0.0,), rest_known=rest_known)
         save_model(tmp_path / "model.yaml", ScannerModel(y=evolve(axis, spread=spread)), "a model")
         loaded = afm.load_model(tmp_path / "model.yaml")
         stated.append(loaded.predict(DRIVE, PERIOD, return_std=True)[1][100:])

@@ -92,6 +92,19 @@ def test_the_command_writes_the_same_figures_everywhere(
     assert files[2].read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("option", ["--json", "--report", "--figure"])
+def test_a_recording_is_never_written_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    folder = record(tmp_path / "bag")
+    kept = {file: file.read_bytes() for file in folder.iterdir()}
+    for file in kept:
+        assert afm_scan(monkeypatch, folder, option, file) == 2
+    (data,) = folder.glob("*.mcap")
+    assert afm_scan(monkeypatch, data, option, data) == 2
+    assert {file: file.read_bytes() for file in folder.iterdir()} == kept
+
+
 @pytest.mark.evidence
 def test_figures_are_written_beside_the_report(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

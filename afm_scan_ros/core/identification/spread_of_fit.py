@@ -54,8 +54,8 @@ def spread_of(known: Knowledge, model: AxisModel, held_out: Sequence[HeldOut]) -
     """Return how far the scanner may be from the model of its fit."""
     period = known.fit.shortest
     bands = band_edges(period, resonance_of(model.vibration, period))
-    of_rest = any(one.rested for one in known.fit.records)
-    spread = Spread(*known.variants(), bands, np.zeros(len(bands) - 1), of_rest)
+    rest_known = any(one.rested for one in known.fit.records)
+    spread = Spread(*known.variants(), bands, np.zeros(len(bands) - 1), rest_known)
     least = known.fit.layout.settings.least_discrepancy
     fitted = _fitted(known, bands)
     shares = _by_band(fitted, np.full(len(bands) - 1, max(one.squared for one in fitted)))

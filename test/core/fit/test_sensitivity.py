@@ -66,7 +66,7 @@ Where it is of order 2, it is delayed too.
 
 
 @pytest.mark.parametrize("sensor_order", [0, 2])
-def test_the_weights_of_modes_that_lack_are_those_of_a_wider_model(
+def test_derivatives_by_the_weights_of_a_further_mode_are_those_of_a_wider_model(
     drive: Array, sensor_order: int
 ) -> None:
     layout, theta, _ = at_some_theta("plays", sensor_order)

@@ -5,7 +5,7 @@ values.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
 from pathlib import Path
 
@@ -114,33 +114,13 @@ def _unit(sides: Sides) -> str:
 
 
 def image_of(path: Path, sides: Sides) -> ScanImage:
-    """Return the image of a channel, lengths in m.
-
-    It assumes no rotation, and says so where a line passes into the next one by it: then both axes
-    of the scanner move along a line. Raises InputError where the trace is missing.
-    """
+    """Return the image of a channel, lengths in m; raises InputError where its trace is missing."""
     if False not in sides:
         raise InputError(
             f"{path}: holds only the retrace of '{sides[True].name}': save its trace as well"
         )
     trace, retrace = sides[False], sides.get(True)
     facts = trace.facts
-    assumptions = []
-    if facts.upward is None:
-        assumptions.append(f"{path}: states no slow direction: it is taken as scanned upward")
-    if facts.overscan is None:
-        assumptions.append(f"{path}: states no overscan: it is taken as none")
-    along, across = np.cos(np.radians(facts.angle)), np.sin(np.radians(facts.angle))
-    if along < 0.0 or abs(across) * facts.range_x * len(trace.values) > facts.range_y:
-        assumptions.append(
-            f"{path}: its lines are rotated by {facts.angle:g}° from the scanner's x: x and y are"
-            " taken along and across the lines, not as the scanner's axes"
-        )
-    if facts.trace_share is not None:
-        assumptions.append(
-            f"{path}: its trace takes {100.0 * facts.trace_share:.3g} % of the time of a line, its"
-            " retrace the rest: both are taken as equally long"
-        )
     return ScanImage(
         _in_si(trace),
         None if retrace is None else _in_si(retrace),
@@ -152,8 +132,31 @@ def image_of(path: Path, sides: Sides) -> ScanImage:
         channel=trace.name,
         unit=METRE if _is_length(trace.unit) else trace.unit,
         name=str(path),
-        assumptions=tuple(assumptions),
+        assumptions=tuple(f"{path}: {each}" for each in _assumptions(facts, len(trace.values))),
     )
+
+
+def _assumptions(facts: ScanFacts, lines: int) -> Iterator[str]:
+    """Say what is taken for what a file does not state, and what it states that is not used.
+
+    A rotation matters where a line passes into the next one by it: both axes of the scanner then
+    move along a line.
+    """
+    if facts.upward is None:
+        yield "states no slow direction: it is taken as scanned upward"
+    if facts.overscan is None:
+        yield "states no overscan: it is taken as none"
+    along, across = np.cos(np.radians(facts.angle)), np.sin(np.radians(facts.angle))
+    if along < 0.0 or abs(across) * facts.range_x * lines > facts.range_y:
+        yield (
+            f"its lines are rotated by {facts.angle:g}° from the scanner's x: x and y are taken"
+            " along and across the lines, not as the scanner's axes"
+        )
+    if facts.trace_share is not None:
+        yield (
+            f"its trace takes {100.0 * facts.trace_share:.3g} % of the time of a line, its retrace"
+            " the rest: both are taken as equally long"
+        )
 
 
 def _in_si(side: Direction) -> Array:

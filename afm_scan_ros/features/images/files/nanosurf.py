@@ -31,8 +31,6 @@ DATA_MARK = b"\r\n#!"
 QUANTITY = re.compile(rf"({A_NUMBER})\s*(\S*)")
 VECTOR = re.compile(r"[DV]\[([^],]*)(?:,[^]]*)?\]\*\[([^],]*)(?:,[^]]*)?\]")
 PERCENT = {"%": 0.01}
-DEGREES = {"°": 1.0, "Â°": 1.0}
-"""The second is UTF-8 that NSFopen takes for Latin-1."""
 IMAGING = "DataSet\\Parameters\\Imaging"
 
 Sections = Mapping[str, Mapping[str, str]]
@@ -113,17 +111,20 @@ def _facts(header: Sections, section: Mapping[str, str]) -> ScanFacts:
         None if one_way is None else 2.0 * one_way,
         UPWARD.get(info.get("Scan direction", "").lower()),
         _number(imaging.get("OverScanSize") or info.get("Overscan", ""), PERCENT),
-        _number(imaging.get("Rotation") or info.get("Rotation", ""), DEGREES) or 0.0,
+        _number(_decoded(imaging.get("Rotation") or info.get("Rotation", "")), {"°": 1.0}) or 0.0,
     )
 
 
 def _unit(section: Mapping[str, str], dim: str) -> str:
-    """Return the unit of a dimension: NSFopen takes newer headers, in UTF-8, for Latin-1."""
-    unit = section[f"{dim}Unit"]
+    return _decoded(section[f"{dim}Unit"])
+
+
+def _decoded(text: str) -> str:
+    """Return a text of a header: NSFopen takes newer ones, in UTF-8, for Latin-1."""
     try:
-        return unit.encode("latin-1").decode("utf-8")
+        return text.encode("latin-1").decode("utf-8")
     except UnicodeDecodeError:
-        return unit
+        return text
 
 
 def _number(text: str, units: Mapping[str, float]) -> float | None:
