@@ -15,7 +15,7 @@ from afm_scan_ros.core.fit.directions import variants
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.signals import Signals
-from afm_scan_ros.core.fit.uncertainty import information, inverse, of_records
+from afm_scan_ros.core.fit.uncertainty import covariance, information, of_records
 from afm_scan_ros.core.model import (
     CONFIDENT,
     BaseEffects,
@@ -55,8 +55,9 @@ class Knowledge:
         own, more, most = (
             fit.layout.prior(scales, fit.theta)[0] for scales in (fit.scales, wider, greatest)
         )
-        each = (told + own, told + more, told + most, most)
-        return cls(fit, every, *(inverse(fit, one) for one in each))
+        nothing = np.zeros_like(told)
+        each = (told, own), (told, more), (told, most), (nothing, most)
+        return cls(fit, every, *(covariance(fit.layout, *one) for one in each))
 
     def tells(self, row: Array, expected: float | None = None) -> bool:
         """Whether the records narrow a combination of θ, (size,), to a share of what is expected.

@@ -7,11 +7,11 @@ equations' H and the prior's precision Λ. What no record tells keeps the prior'
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.signal import welch
 
-from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.parameters import Layout
 from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.types import Array
 
@@ -50,10 +50,17 @@ def samples_alike(left: Array, segments: int) -> float:
     return max(correlation_length(left), float(np.mean(density**2) / np.mean(density) ** 2))
 
 
-def inverse(fit: AxisFit, matrix: Array) -> Array:
-    """Inverse of a precision of θ, shape (size, size); raises ScanError where it has none."""
-    try:
-        factor = cho_factor(fit.layout.conditioned(matrix))
-    except LinAlgError as error:
-        raise ScanError("the fit diverged: its parameters have no bound") from error
-    return np.asarray(cho_solve(factor, np.eye(len(matrix))))
+def covariance(layout: Layout, told: Array, prior: Array) -> Array:
+    """(H + Λ)⁻¹ of what the records have ``told`` and of the prior, each of shape (size, size).
+
+    Both are joined by their square roots, in units of the diagonal of H + Λ. What H holds below its
+    own rounding is taken as not told: there the prior alone is left, which has a bound.
+    """
+    units = np.sqrt(np.diag(told) + np.diag(prior))
+    values, vectors = eigh(told / np.outer(units, units))
+    seen = values > len(values) * np.finfo(float).eps * values[-1]
+    known = np.sqrt(values[seen, None]) * vectors[:, seen].T
+    own = cholesky(layout.conditioned(prior)) / units
+    upper = qr(np.concatenate([known, own]), mode="r")[0][: len(units)]
+    inverse = solve_triangular(upper, np.eye(len(units))) / units[:, None]
+    return np.asarray(inverse @ inverse.T)

@@ -6,7 +6,7 @@ from attrs import evolve
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.alternatives import with_one_state
 from afm_scan_ros.core.fit.axis import fit_axis
 from afm_scan_ros.core.fit.descent import settle
@@ -18,7 +18,7 @@ from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.told import Knowledge
-from afm_scan_ros.core.fit.uncertainty import inverse
+from afm_scan_ros.core.fit.uncertainty import covariance
 from afm_scan_ros.core.identification.spread_of_fit import spread_of
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction_error import apart
@@ -45,11 +45,21 @@ def drive() -> Array:
     return levels(1, 14, 600)
 
 
-def test_a_fit_without_a_covariance_says_so() -> None:
-    drive = levels(4, 6, 300)
-    fit = AxisFit(*of_plays_alone(drive, GAIN * drive))
-    with pytest.raises(ScanError, match="no bound"):
-        inverse(fit, -np.eye(fit.layout.size))
+@pytest.mark.parametrize("alike", [1e-3, 0.0])
+def test_what_records_tell_no_more_than_rounding_is_as_uncertain_as_beforehand(
+    alike: float,
+) -> None:
+    """Two columns alike in 10^12 units of the prior tell their sum, and their difference never."""
+    layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS)
+    prior, rng = np.eye(3), np.random.default_rng(6)
+    rows = 1e3 * rng.standard_normal((1000, 3))
+    rows[:, 1] = rows[:, 0] + alike * rows[:, 1]
+    told = rows.T @ rows * (1.0 if alike else 1e6)
+    found = covariance(layout, told, prior)
+    difference = np.array([1.0, -1.0, 0.0])
+    expected = difference @ np.linalg.inv(told + prior) @ difference if alike else 2.0
+    assert difference @ found @ difference == pytest.approx(expected, rel=1e-6)
+    assert np.linalg.eigvalsh(found)[0] > 0.0
 
 
 def test_the_model_answers_as_the_fit_does(drive: Array) -> None:
