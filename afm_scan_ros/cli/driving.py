@@ -1,7 +1,6 @@
 """Drives the scanner of --scanner: through plans, also grown while watched, and through scans."""
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -13,7 +12,7 @@ from afm_scan_ros.cli.execution import execute_record
 from afm_scan_ros.cli.options import grouped, refuse_existing
 from afm_scan_ros.cli.orders import RecordOrder, ScanFiles, refuse_pace
 from afm_scan_ros.cli.plan import covered
-from afm_scan_ros.cli.processes import set_aside
+from afm_scan_ros.cli.processes import setting_aside
 from afm_scan_ros.cli.scan import run_scan
 from afm_scan_ros.cli.scanner import (
     PLANT,
@@ -27,7 +26,6 @@ from afm_scan_ros.cli.scanner import (
     time_scale_option,
 )
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import peak
@@ -117,14 +115,9 @@ def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Wave
     bags = {out / plan.name: plan for plan in plans}
     refuse_existing(*bags)
     out.mkdir(parents=True, exist_ok=True)
-    try:
+    with setting_aside(bags):
         for number, (bag, plan) in enumerate(bags.items(), 1):
             scanner.record(plan, bag, f"{plan.name} record, {number} of {len(bags)}")
-    except (InputError, ScanError) as error:
-        raise type(error)(f"{error}{set_aside(bags, error)}") from error
-    except KeyboardInterrupt:
-        set_aside(bags)
-        raise
 
 
 SIGNALS = ("desired_displacement", "drive_voltage", "achieved_displacement")
@@ -264,15 +257,7 @@ class PlannedCalibration:
         bag = self.out / name if step.whole else self.out / TRIALS / name
         bag.parent.mkdir(parents=True, exist_ok=True)
         title = f"{plan.name} record" if step.whole else f"{plan.name}, {step.share:.1%} of it"
-        try:
+        with setting_aside([bag]):
             self.scanner.record(plan, bag, title)
-        except (InputError, ScanError) as error:
-            with suppress(OSError):  # it holds other trials
-                bag.parent.rmdir()
-            raise type(error)(f"{error}{set_aside([bag], error)}") from error
-        except KeyboardInterrupt:
-            aside = set_aside([bag])
-            click.echo(f"stopped during the {title}{aside}; earlier records are in {self.out}")
-            raise
         recording = read_scan(bag)
         return recording.whole("drive_voltage"), recording.whole("achieved_displacement")

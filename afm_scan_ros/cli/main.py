@@ -163,8 +163,8 @@ def main() -> NoReturn:
         _end(error, BAD_INPUT)
     except ScanError as error:
         _end(error, DOES_NOT_HOLD)
-    except click.Abort:
-        _end("interrupted", INTERRUPTED)
+    except click.Abort as error:
+        _end(str(error.__cause__ or "") or "interrupted", INTERRUPTED)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "afm-scan"
         _end(f"{error.format_message().removesuffix('.')}. See '{command} --help'.", BAD_INPUT)

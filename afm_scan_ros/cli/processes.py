@@ -13,8 +13,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -154,12 +154,23 @@ class NodeProcess:
         return self.output.read()
 
 
-def set_aside(bags: Iterable[Path], error: BaseException | None = None) -> str:
-    """Rename the bags of a run that failed to NAME.failed, so that it can be tried again.
+@contextmanager
+def setting_aside(bags: Iterable[Path]) -> Iterator[None]:
+    """Rename the bags of a run that fails within to NAME.failed, so that it can be tried again.
 
-    An earlier NAME.failed is replaced. The last of them also gets the tracebacks that the ``error``
-    has as notes. Returns where all this is, to follow the error's text.
+    An earlier NAME.failed is replaced. The last of them also gets the tracebacks that an error has
+    as notes. Raises what was raised, whose text then says where all this is.
     """
+    try:
+        yield
+    except (InputError, ScanError) as error:
+        raise type(error)(f"{error}{_set_aside(bags, error)}") from error
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(f"interrupted{_set_aside(bags, error)}") from error
+
+
+def _set_aside(bags: Iterable[Path], error: BaseException) -> str:
+    """Return where the bags and the notes of an error now are, to follow the error's text."""
     kept = []
     for bag in (each for each in bags if each.exists()):
         failed = bag.with_name(f"{bag.name}.failed")

@@ -11,7 +11,7 @@ import click
 from afm_scan_ros.cli import orders
 from afm_scan_ros.cli.execution import execute_scan
 from afm_scan_ros.cli.options import BAG, CONFIG, FILE, refuse_existing
-from afm_scan_ros.cli.processes import set_aside
+from afm_scan_ros.cli.processes import setting_aside
 from afm_scan_ros.cli.scanner import (
     FILES,
     ScannerChoice,
@@ -24,7 +24,7 @@ from afm_scan_ros.cli.scanner import (
     time_scale_option,
 )
 from afm_scan_ros.core.correction import Correction
-from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -76,10 +76,8 @@ def run_scan(
     order = orders.ScanOrder(
         files, spec, flow, model, inverses, scanner, time_scale, every, images, watched, views
     )
-    try:
+    with setting_aside([files.bag]):
         execute_scan(order)
-    except (InputError, ScanError) as error:
-        raise type(error)(f"{error}{set_aside([files.bag], error)}") from error
 
 
 def _refuse_unsuited(

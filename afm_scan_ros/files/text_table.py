@@ -62,8 +62,12 @@ class Dialect:
     separator: str | None
 
     def cells(self, line: str) -> list[str]:
-        """Return what stands between the separators, without quotation marks."""
-        return [cell.strip().strip('"').strip() for cell in line.split(self.separator)]
+        """Return what stands between the separators, without quotation marks.
+
+        Of a line with more columns than a table may have, the last holds all that is over.
+        """
+        cells = line.split(self.separator, MOST_COLUMNS)
+        return [cell.strip().strip('"').strip() for cell in cells]
 
     def with_points(self, line: str) -> str:
         """Return a row or a cell with decimal points."""
@@ -164,7 +168,7 @@ def read_text(path: Path, taken: RowRange) -> TextTable:
         raise InputError(f"{path}: no rows{after}: give columns of drive and displacement")
     dialect, width, numeric = _sniffed(rows)
     if width > MOST_COLUMNS:
-        raise InputError(f"{path}: {width} columns, over {MOST_COLUMNS}: give a table of a record")
+        raise InputError(f"{path}: over {MOST_COLUMNS} columns: give a table of a record")
     first = _first_row(TextTable(path, dialect, numbers, rows), width, numeric)
     heading = lines[: numbers[first] - 1]
     within = taken.of(path, len(rows) - first)

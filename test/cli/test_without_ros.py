@@ -276,9 +276,11 @@ def test_an_interrupted_scan_is_at_rest_and_can_be_read(
 ) -> None:
     scanning.send_signal(number)
     _, said = scanning.communicate(timeout=PATIENCE)
-    assert (scanning.returncode, said.splitlines()[-1]) == (130, "afm-scan: interrupted")
+    kept = tmp_path / "bag.failed"
+    last = f"afm-scan: interrupted; what was recorded is in {kept}"
+    assert (scanning.returncode, said.splitlines()[-1]) == (130, last)
     assert moved_to_rest(tmp_path)
-    assert len(read_scan(tmp_path / "bag").whole("achieved_displacement").x) > 1000
+    assert len(read_scan(kept).whole("achieved_displacement").x) > 1000
 
 
 @pytest.mark.skipif("not __import__('afm_scan_ros.nodes').nodes.lacking_ros()")

@@ -95,12 +95,13 @@ def test_ctrl_c_ramps_down_and_keeps_what_was_recorded(tmp_path: Path, settings:
     command.send_signal(signal.SIGINT)
     _, said = command.communicate(timeout=PATIENCE)
     assert command.returncode == 130
-    assert said.rstrip().endswith("afm-scan: interrupted")
+    kept = tmp_path / "out/stepped_sine.failed"
+    assert said.rstrip().endswith(f"afm-scan: interrupted; what was recorded is in {kept}")
     outputs = np.loadtxt(log, ndmin=2)
     assert np.any(outputs[:, 2:]), said
     assert not np.any(outputs[-1, 2:])
-    kept = read_scan(tmp_path / "out/stepped_sine.failed").whole("drive_voltage")
-    assert 0 < kept.x.size < 60.0 / kept.sample_period
+    drive = read_scan(kept).whole("drive_voltage")
+    assert 0 < drive.x.size < 60.0 / drive.sample_period
 
 
 def moving(log: Path) -> bool:
