@@ -16,7 +16,11 @@ from afm_scan_ros.core.identification.identify import Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
-from afm_scan_ros.report.effect_status_text import status_text, unknown_effects
+from afm_scan_ros.report.effect_status_text import (
+    intervals_text,
+    status_text,
+    unknown_effects,
+)
 from afm_scan_ros.report.fit_page import fit_report
 from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.terminal import say
@@ -117,7 +121,8 @@ def _show_coupled(found: CoupledScanner) -> None:
 
 def _show_axis(axis: str, found: FittedAxis) -> None:
     for effect, status in found.model.effects.each():
-        say(f"{axis}: {effect}: {status_text(status)}")
+        known = filter(None, (status_text(status), intervals_text(status)))
+        say(f"{axis}: {effect}: {'; '.join(known)}")
     say(
         f"   hysteresis by {found.operator}; a scan is predicted to {100.0 * found.deviation:.2g}%"
         " of its range (standard deviation)"

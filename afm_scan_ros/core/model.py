@@ -75,6 +75,11 @@ class ParameterInterval:
     lower: float | None = None
     upper: float | None = None
 
+    @property
+    def holds_zero(self) -> bool:
+        """Whether both ends are known, with zero between them."""
+        return self.lower is not None and self.upper is not None and self.lower <= 0 <= self.upper
+
 
 def closed(name: str, interval: Range, unit: str) -> ParameterInterval:
     """Return an interval whose ends may be infinite as one whose ends may be open."""

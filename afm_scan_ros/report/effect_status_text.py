@@ -30,7 +30,8 @@ def status_text(status: EffectStatus, drive: str = "V") -> str:
         _between(status.frequencies, "Hz"),
         _between(status.hold_times, "s"),
     ]
-    return ", ".join([status.status.value, *filter(None, parts)])
+    seen = "none seen" if any(one.holds_zero for one in status.intervals) else ""
+    return ", ".join(filter(None, [status.status.value, seen, *parts]))
 
 
 def intervals_text(status: EffectStatus) -> str:
