@@ -28,7 +28,7 @@ from afm_scan_ros.features.learning.report import (
 from afm_scan_ros.files.learned_file import save_learned
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_scan
-from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.nodes.parameters import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
 from afm_scan_ros.report.page import CommandLine
 from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of

@@ -27,7 +27,7 @@ from afm_scan_ros.files.model_pair import load_sealed
 from afm_scan_ros.files.plant_file import PARAMETERS, load_plant, load_scan
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.yaml import save
-from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.nodes.parameters import FLOW
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
