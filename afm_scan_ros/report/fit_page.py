@@ -13,7 +13,6 @@ from afm_scan_ros.core.identification.local_response import Complex
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.fit_summary import finding_text
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import (
@@ -31,21 +30,13 @@ from afm_scan_ros.report.picture import (
     Picture,
     Steps,
 )
+from afm_scan_ros.report.sentences import intervals_text, sentence, status_text
 from afm_scan_ros.report.table import Rows
 
 KNOWN = ("", "known, and where it holds", "95 % intervals")
 LEFT = ("measured less model", "sigma, nm", "max, nm", "samples")
 DIRECT = ("drive of the inverse less that of the records", "sigma, mV", "max, mV", "samples")
 DISCREPANCY = ("band, Hz", "discrepancy, nm rms", "noise, nm rms", "discrepancy / motion")
-MERITS = (
-    "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
-    " 18). Max is its largest magnitude (Eqs. 3 and 19)."
-)
-METHOD = (
-    "Model discrepancy is measured minus predicted displacement of a held-out record, without"
-    " sensor noise. The noise is estimated at rest before the first move, and is taken as white."
-    " Both together are the detection limit of a later diagnosis."
-)
 
 
 def fit_report(found: Identification, model: Path) -> ReportPage:
@@ -67,45 +58,30 @@ def fit_report(found: Identification, model: Path) -> ReportPage:
             Section("Fit and prediction of each record", list(_fits(found))),
             Section("Response and vibration", [fit_picture(found, "response")]),
             Section("Creep and hysteresis", [fit_picture(found, "slow")]),
-            Section("Model discrepancy", [METHOD, *_discrepancies(found)]),
+            Section("Model discrepancy", [sentence("fit.method"), *_discrepancies(found)]),
         ],
     )
 
 
 def _answer(found: Identification) -> Iterator[str]:
-    shares = [f"{100 * a.deviation:.2g} % in {name}" for name, a in found.axes.items()]
-    yield (
-        "The model predicts the displacement of a scan over the whole drive to"
-        f" {' and '.join(shares)} of its range (one standard deviation)."
-    )
-    left = [
-        f"{NANO * one.misfit.sigma:.3g} nm in {name}"
-        for name, axis in found.axes.items()
-        for one in axis.validations[:1]
-    ]
-    if left:
-        yield f"Of a record that was not fitted it leaves {' and '.join(left)} rms."
-    else:
-        yield "No record was held out of the fit, so its error in another record is not known."
+    shares = {name: axis.deviation for name, axis in found.axes.items()}
+    yield sentence("fit.prediction", shares=shares)
+    left = {n: one.misfit.sigma for n, axis in found.axes.items() for one in axis.validations[:1]}
+    yield sentence("fit.held_out" if left else "fit.none_held_out", left=left)
 
 
 def _next(model: Path) -> Iterator[CommandLine]:
     bag, diagnosis = (model.with_name(f"{model.stem}_{name}") for name in ("scan", "diagnosis"))
-    yield CommandLine(
-        "Scan with the model's inverse. Name your scanner with --scanner, or else the simulated one"
-        " is scanned.",
-        ["scan", "--model", model, "--bag", bag],
-    )
-    yield CommandLine(
-        "Ask now and then whether the scanner still is what the model says.",
-        ["diagnose", bag, "--model", model, "--out", diagnosis],
-    )
+    scan = ["scan", "--model", model, "--bag", bag]
+    yield CommandLine(sentence("fit.scan"), scan)
+    diagnose = ["diagnose", bag, "--model", model, "--out", diagnosis]
+    yield CommandLine(sentence("fit.diagnose"), diagnose)
 
 
 def _fits(found: Identification) -> Iterator[Part]:
-    yield MERITS
+    yield sentence("fit.merits")
     for name, axis in found.axes.items():
-        yield f"The hysteresis of {name} is of {axis.operator}."
+        yield sentence("fit.operator", name=name, operator=axis.operator)
         yield Rows(LEFT, list(_merits(axis)), f"Axis {name}")
         direct = _merit("direct inverse of the hysteresis", axis.direct, MILLI)
         yield Rows(DIRECT, [direct])

@@ -1,23 +1,55 @@
-"""How each effect of a model is known, in sentences."""
+"""The catalogue of sentences: what a verdict, a finding or the status of an effect says in words.
+
+``templates/sentences.yaml`` has each by its code, as a template of Jinja. It is text: pages escape
+it. A value that a sentence names and that is not given is an error.
+"""
 
 from collections.abc import Iterator, Mapping
+from functools import cache
+from math import isnan
+from pathlib import Path
+
+import yaml
+from jinja2 import Environment, StrictUndefined, Template
 
 from afm_scan_ros.core.model import BaseEffects, EffectStatus, ParameterInterval, Range
+from afm_scan_ros.report.quantity import nanometres, percent, probability, significant
 
-RECORDS = {
-    "creep": "steps that are held for minutes",
-    "hysteresis": "triangles, loops or sines of several amplitudes",
-    "frequency": "a multisine or a sweep up to beyond the first resonance",
+WORDS = Environment(undefined=StrictUndefined)  # noqa: S701 - text, no markup
+WORDS.filters |= {
+    "f": format,
+    "nm": nanometres,
+    "percent": percent,
+    "probability": probability,
+    "significant": significant,
 }
-"""What to record, by the kind of record."""
+WORDS.tests["known"] = lambda value: not isnan(value)
+
+
+def sentence(code: str, **values: object) -> str:
+    """Return the sentence of a code, as ``verdict.ambiguous``, filled with values."""
+    return _template(code).render(values)
+
+
+@cache
+def _template(code: str) -> Template:
+    section, _, name = code.partition(".")
+    return WORDS.from_string(_texts()[section][name])
+
+
+@cache
+def _texts() -> dict[str, dict[str, str]]:
+    file = Path(__file__).parent / "templates" / "sentences.yaml"
+    texts: dict[str, dict[str, str]] = yaml.safe_load(file.read_text("utf-8"))
+    return texts
 
 
 def unknown_effects(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
     """Yield a sentence for each effect that is unknown, by axis, with what would identify it."""
     for axis, base in effects.items():
         for name, status in base.unknown():
-            record = RECORDS[status.identifiable_from]
-            yield f"{axis}: {name} is unknown. Record {record}."
+            record = sentence(f"record.{status.identifiable_from}")
+            yield sentence("fit.unknown", axis=axis, name=name, record=record)
 
 
 def status_text(status: EffectStatus, drive: str = "V") -> str:
