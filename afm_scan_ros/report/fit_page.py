@@ -207,17 +207,10 @@ def _bands(name: str, found: FittedAxis) -> Panel:
     return Panel(steps, HERTZ, "rms in nm", f"{name}: {which}, rms by band", "xy")
 
 
-CAPTIONS = {
-    "fit": "Left: rms by band of the motion of a record, if there is one that was not fitted, and"
-    " of what the model leaves of it. Right: what the model leaves of each record.",
-    "response": "Response of the displacement to F = H(u), creep and the converter's hold included:"
-    " by local fits to each record, and of the model.",
-    "slow": "Creep of the model after a step, and the loops F = H(u) of the records.",
-}
 PANELS = {"fit": (_bands, _left), "response": (_magnitude, _phase), "slow": (_creep, _loops)}
 
 
 def fit_picture(found: Identification, name: str) -> Picture:
     """Return the picture of a name among ``PANELS``, with a row for each axis."""
     rows = [[draw(axis, of) for draw in PANELS[name]] for axis, of in found.axes.items()]
-    return Picture(name, CAPTIONS[name], rows)
+    return Picture(name, sentence(f"caption.{name}"), rows)

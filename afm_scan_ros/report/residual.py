@@ -147,7 +147,7 @@ def residual_pictures(
     record, seen = stages[0].record, "frequency of the spectrum in Hz"
     first = Picture(
         f"residual_{axis}",
-        f"The residual in {axis} of {record}. Tap a band to see its spectrum.",
+        sentence("caption.residual", axis=axis, record=record),
         (
             [
                 Panel(bands, HERTZ, "rms by band in nm", log="xy", role="bands"),
@@ -158,9 +158,7 @@ def residual_pictures(
     )
     second = Picture(
         f"dependence_{axis}",
-        f"The residual in {axis} of {record}: by position and speed, mean ± standard deviation; the"
-        " mean line, or by travel where the record has no lines; and its autocorrelation, as its"
-        " range in each interval of lag.",
+        sentence("caption.dependence", axis=axis, record=record),
         (
             [_dependence(quantity, named) for quantity in ("position", "speed")],
             [_lines(named), _correlation_panel(named)],

@@ -10,6 +10,7 @@ from math import isnan
 from pathlib import Path
 
 import yaml
+from attrs import frozen
 from jinja2 import Environment, StrictUndefined, Template
 
 from afm_scan_ros.core.model import BaseEffects, EffectStatus, ParameterInterval, Range
@@ -26,22 +27,31 @@ WORDS.filters |= {
 WORDS.tests["known"] = lambda value: not isnan(value)
 
 
-def sentence(code: str, **values: object) -> str:
-    """Return the sentence of a code, as ``verdict.ambiguous``, filled with values."""
-    return _template(code).render(values)
+@frozen
+class Catalogue:
+    """The sentences of a file, by their codes."""
+
+    file: Path
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Return the sentence of a code, as ``verdict.ambiguous``, filled with values."""
+        return _template(self.file, code).render(values)
 
 
 @cache
-def _template(code: str) -> Template:
+def _template(file: Path, code: str) -> Template:
     section, _, name = code.partition(".")
-    return WORDS.from_string(_texts()[section][name])
+    return WORDS.from_string(_texts(file)[section][name])
 
 
 @cache
-def _texts() -> dict[str, dict[str, str]]:
-    file = Path(__file__).parent / "templates" / "sentences.yaml"
+def _texts(file: Path) -> dict[str, dict[str, str]]:
     texts: dict[str, dict[str, str]] = yaml.safe_load(file.read_text("utf-8"))
     return texts
+
+
+sentence = Catalogue(Path(__file__).parent / "templates" / "sentences.yaml")
+"""Those of the kernel; a feature has its own."""
 
 
 def unknown_effects(effects: Mapping[str, BaseEffects]) -> Iterator[str]:
