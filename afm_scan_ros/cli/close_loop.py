@@ -27,7 +27,7 @@ from afm_scan_ros.report.close_loop import close_loop_report, final_text, report
 from afm_scan_ros.report.diagnosis_json import closed_loop_document, diagnosis_of, save_diagnosis
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import next_steps
-from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
+from afm_scan_ros.report.page import Provenance, Source, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 

@@ -28,7 +28,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.files.records import naming

@@ -171,7 +171,6 @@ class BlockSource(ScanNode):
         return float(self._start + elapsed)
 
     def _log_progress(self, before: int, after: int) -> None:
-        """Log each tenth of the scan."""
         if (tenth := 10 * after // self.total) > 10 * before // self.total:
             self.get_logger().info(f"{10 * tenth} %: sample {after} of {self.total} is sent")
 

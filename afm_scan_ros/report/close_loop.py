@@ -8,10 +8,9 @@ from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import diagnosis_text as text
-from afm_scan_ros.report.page import PageLink, ReportPage, Section
+from afm_scan_ros.report.page import PageLink, Provenance, ReportPage, Section
 from afm_scan_ros.report.page import Part as PagePart
 from afm_scan_ros.report.picture import Picture
-from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_pictures import TwoScans, error_picture, image_picture, images_of
 from afm_scan_ros.report.sentences import sentence
@@ -43,7 +42,6 @@ def _trial_rows(done: Round, cells: Callable[[ScanComparison, str], Iterable[str
 
 
 def _tracked(trial: ScanComparison, axis: str) -> Iterator[str]:
-    """Yield the errors before and after."""
     yield _change(trial.measured_before, trial.measured_after, axis, "all")
     for part in ("all", "constant_speed", "turnarounds"):
         yield _change(trial.true_before, trial.true_after, axis, part)

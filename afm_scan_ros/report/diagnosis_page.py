@@ -23,9 +23,8 @@ from afm_scan_ros.files.coupled_file import save_coupled
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import diagnosis_text as text
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
-from afm_scan_ros.report.page import ReportPage, Section
+from afm_scan_ros.report.page import Provenance, ReportPage, Section, heading_lines
 from afm_scan_ros.report.picture import Picture
-from afm_scan_ros.report.provenance import Provenance, heading_lines
 from afm_scan_ros.report.quantity import nanometres, probability, significant
 from afm_scan_ros.report.residual import initial_state_text, residual_pictures, residual_text
 from afm_scan_ros.report.sentences import sentence
@@ -98,7 +97,6 @@ def _pictures(found: ResidualReport, diagnosed: AxisDiagnosis) -> tuple[Picture,
 
 
 def _effects(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield the equation of each effect and the evidence for it."""
     for effect in found.effects:
         yield text.form_text(effect)
         yield " ".join((text.share_text(effect), *text.evidence_text(effect)))

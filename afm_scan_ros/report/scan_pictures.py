@@ -162,7 +162,6 @@ def _over_time(
 
 
 def _drive(view: ScanExcerpt, drive: Trace) -> Panel:
-    """Show the drives of both axes."""
     curves = [
         Curve(view.milliseconds, drive.axis(axis), axis, colour)
         for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)

@@ -30,7 +30,7 @@ from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.columns import Signal, write_signals
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import scan_spec
-from afm_scan_ros.report.provenance import UNSTATED, source_of
+from afm_scan_ros.report.page import UNSTATED, source_of
 from afm_scan_ros.report.terminal import say
 
 TEXT, NETCDF = ".csv", ".nc"

@@ -15,9 +15,8 @@ from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.diagnosis_json import Document
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.page import CommandLine, ReportPage, Section
+from afm_scan_ros.report.page import CommandLine, Provenance, ReportPage, Section
 from afm_scan_ros.report.picture import BLUE, NANO, ORANGE, Curve, Panel, Picture
-from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import TwoScans, error_picture
 from afm_scan_ros.report.sentences import Catalogue

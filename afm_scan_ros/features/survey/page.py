@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
 from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
 from afm_scan_ros.report import picture
-from afm_scan_ros.report.page import CommandLine, Listing, ReportPage, Section
-from afm_scan_ros.report.provenance import UNSTATED
+from afm_scan_ros.report.page import UNSTATED, CommandLine, Listing, ReportPage, Section
 from afm_scan_ros.report.quantity import nanometres, quantity, significant
 from afm_scan_ros.report.scan_pictures import LOW
 from afm_scan_ros.report.sentences import Catalogue
@@ -249,5 +248,4 @@ def _trend(
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:
-    """Times as a figure's axis has them."""
     return np.array(stamps, dtype="datetime64[ns]")
