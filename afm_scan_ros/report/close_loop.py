@@ -137,20 +137,15 @@ def _round(number: int, done: Round, *, first: bool) -> Section:
     if done.comparisons:
         parts += [Rows(RESIDUAL, _trial_rows(done, _left)), sentence("loop.unseen")]
         parts += [] if first else [_lines(done, number)]
-        parts.append(_grating(done, number))
+        imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
+        images = images_of(TwoScans.of(done.before[imaged], done.after[imaged], *NAMES))
+        parts.append(image_picture(f"grating_{number}", images, f"as '{imaged}'"))
     return Section(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}", parts)
 
 
 def _lines(done: Round, number: int) -> Picture:
     scans = TwoScans.of(done.before[FIRST], done.after[FIRST], *NAMES)
     return error_picture(f"lines_{number}", scans)
-
-
-def _grating(done: Round, number: int) -> Picture:
-    """Show a grating as a scan with either inverse images it."""
-    imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
-    images = images_of(TwoScans.of(done.before[imaged], done.after[imaged], *NAMES))
-    return image_picture(f"grating_{number}", images, f"as '{imaged}'")
 
 
 def _change(before: Tracking | None, after: Tracking | None, axis: str, part: str) -> str:

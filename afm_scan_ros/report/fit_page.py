@@ -135,16 +135,11 @@ def _fits(found: Identification) -> Iterator[Part]:
     yield sentence("fit.merits")
     for name, axis in found.axes.items():
         yield sentence("fit.operator", name=name, operator=axis.operator)
-        yield Rows(LEFT, list(_merits(axis)), f"Axis {name}")
+        fitted = [_merit(f"{each.name}, fitted", each.misfit, NANO) for each in axis.records]
+        held_out = [_merit(f"{e.record}, held out", e.misfit, NANO) for e in axis.validations]
+        yield Rows(LEFT, [*fitted, *held_out], f"Axis {name}")
         direct = _merit("direct inverse of the hysteresis", axis.direct, MILLI)
         yield Rows(DIRECT, [direct])
-
-
-def _merits(axis: FittedAxis) -> Iterator[tuple[str, ...]]:
-    for record in axis.records:
-        yield _merit(f"{record.name}, fitted", record.misfit, NANO)
-    for one in axis.validations:
-        yield _merit(f"{one.record}, held out", one.misfit, NANO)
 
 
 def _merit(name: str, of: Misfit, scale: float) -> tuple[str, ...]:

@@ -11,10 +11,9 @@ import numpy as np
 
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import messages
-from afm_scan_ros.bag.monitored import IMAGE, heights, line_of, way_of
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
 from afm_scan_ros.bag.scan_info import LINE
-from afm_scan_ros.bag.typestore import decode
+from afm_scan_ros.bag.typestore import IMAGE, decode, heights, line_of, way_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.image_lines import frame_of, most_pixels, pixel_means
 from afm_scan_ros.core.scan_spec import ScanSpec
