@@ -44,7 +44,6 @@ def filled(name: str, folder: Path = TEMPLATES, **values: object) -> str:
     return templates.get_template(name).render(values)
 
 
-NANO = 1e-9
 DIGITS = 12
 """Of a sample rate: its inverse is what a bag states, and the last digits are the division's."""
 UNSTATED = "not stated"
@@ -103,7 +102,7 @@ def source_of(name: str, info: ScanInfo, samples: int, shortcomings: Iterable[st
         bag=name,
         scan_id=info.scan_id,
         pattern=info.pattern,
-        recorded=_utc(datetime.fromtimestamp(NANO * info.start, UTC)) if info.start else None,
+        recorded=_utc(datetime.fromtimestamp(1e-9 * info.start, UTC)) if info.start else None,
         sample_rate=float(f"{1.0 / info.sample_period:.{DIGITS}g}"),
         samples=samples,
         samples_announced=info.total_samples,

@@ -10,7 +10,13 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
-from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
+from afm_scan_ros.features.survey.recording import (
+    QUANTITIES,
+    RESIDUAL,
+    EffectValue,
+    NamedEffect,
+    Recording,
+)
 from afm_scan_ros.report import picture
 from afm_scan_ros.report.page import UNSTATED, CommandLine, Listing, ReportPage, Section
 from afm_scan_ros.report.quantity import nanometres, quantity, significant
@@ -20,16 +26,8 @@ from afm_scan_ros.report.table import Part, Rows
 
 said = Catalogue(Path(__file__).parent / "templates" / "sentences.yaml")
 
-NANO = 1e-9
 PLACE = "{instrument}"
 """What stands for an instrument in the name of a model's file."""
-QUANTITIES = {
-    "gain": "gain of {}",
-    "resonance": "first resonance of {}",
-    "damping": "damping ratio of {}",
-    "creep": "creep of {}",
-    "residual_ratio": "residual of {} over its detection limit",
-}
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 
 
@@ -208,7 +206,7 @@ def _value_text(value: EffectValue) -> str:
 
 
 def _what(change: Change) -> str:
-    return QUANTITIES[change.name].format(change.axis)
+    return said(f"quantity.{change.name}", axis=change.axis)
 
 
 def _factor(change: Change) -> str:
@@ -219,7 +217,7 @@ def _factor(change: Change) -> str:
 
 
 def _time(stamp: int) -> str:
-    return f"{datetime.fromtimestamp(NANO * stamp, UTC):%Y-%m-%d %H:%M}" if stamp else UNSTATED
+    return f"{datetime.fromtimestamp(1e-9 * stamp, UTC):%Y-%m-%d %H:%M}" if stamp else UNSTATED
 
 
 def _trend(
@@ -243,7 +241,7 @@ def _trend(
         picture.Curve(times, values, "", picture.BLUE, dots=True),
     ]
     over = "over its limit" if name == RESIDUAL else "over the model's"
-    title = QUANTITIES[name].format(axis)
+    title = said(f"quantity.{name}", axis=axis)
     return picture.Panel(marks, "time", over, title, level=1.0, dates=True)
 
 
