@@ -39,11 +39,11 @@ from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.diagnosis import info_of
-from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.drive_files import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report import plan_text
-from afm_scan_ros.report.provenance import Source, source_of
+from afm_scan_ros.report.page import Source, source_of
 from afm_scan_ros.report.table import Row
 
 

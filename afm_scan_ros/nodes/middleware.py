@@ -156,7 +156,6 @@ def _lacks_memory(root: ET.Element, environment: Mapping[str, str]) -> Iterator[
 
 
 def _lacks_heartbeats(root: ET.Element) -> Iterator[str]:
-    """Look at the default writer."""
     writer = next(_defaults(root, "data_writer", "publisher"), None)
     if writer is None:
         yield (

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes import NODES, middleware
 from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.ending import end_within
@@ -33,8 +33,8 @@ AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def node_class(name: str) -> type[ScanNode]:
-    """Import the module of a node, and return its class, as ``ScanImager`` of ``scan_imager``."""
-    module = import_module(f"afm_scan_ros.nodes.{name}")
+    """Import the module of a node, and return its class."""
+    module = import_module(f"afm_scan_ros.nodes.{NODES[name]}")
     found: type[ScanNode] = getattr(module, name.title().replace("_", ""))
     return found
 

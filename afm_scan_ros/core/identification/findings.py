@@ -1,6 +1,6 @@
 """What an identification finds wrong with a record or a fit, as values; SI units throughout.
 
-``afm_scan_ros.report.fit_summary`` words each finding and what to record instead.
+``afm_scan_ros.report.fit_page`` words each finding and what to record instead.
 """
 
 from attrs import frozen
