@@ -23,7 +23,6 @@ from afm_scan_ros.core.identification.drives.proposal import (
     ProposedRecord,
     response_peak,
 )
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 FIRST = 1.0 / 16.0
@@ -103,7 +102,7 @@ class Watched:
     responses: Mapping[str, MeasuredResponse]
 
 
-Drive = Callable[[Plan[Waveform], GrowthStep], tuple[Trace, Trace]]
+Drive = Callable[[Plan, GrowthStep], tuple[Trace, Trace]]
 """Drives a plan, and returns drive (V) and measured displacement (m)."""
 
 

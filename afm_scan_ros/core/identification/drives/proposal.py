@@ -22,13 +22,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
     scaled,
     validation_plan,
 )
-from afm_scan_ros.core.identification.drives.waveforms import (
-    Multisine,
-    Raised,
-    Waveform,
-    Waypoints,
-    whole,
-)
+from afm_scan_ros.core.identification.drives.waveforms import raised
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.model import ScannerModel
@@ -204,8 +198,8 @@ class ProposedRecord:
     ``trial`` is as large, as fast and as sudden, and shorter where it can be.
     """
 
-    plan: Plan[Waveform]
-    trial: Plan[Waveform]
+    plan: Plan
+    trial: Plan
     identifies: str
     covers: float
 
@@ -217,8 +211,11 @@ class ProposedRecord:
     @property
     def steepest(self) -> float:
         """Steepest slope of the drive and of its trial, V/s."""
-        waves = (wave for plan in (self.plan, self.trial) for wave in (plan.x, plan.y))
-        return max(float(np.abs(np.diff(whole(w))).max() / w.sample_period) for w in waves)
+        return max(
+            float(np.abs(np.diff(wave)).max()) / plan.sample_period
+            for plan in (self.plan, self.trial)
+            for wave in (plan.x, plan.y)
+        )
 
     def scaled(self, share: float) -> "ProposedRecord":
         """Return the record with all voltages multiplied."""
@@ -261,8 +258,10 @@ def _lacking(
     if have.resonance is None:
         highest = converter.rate / PER_PERIOD
         waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
-        survey = evolve(frequency_plan(lines=waves), name="survey")
-        yield _record(converter, survey, _brief(survey), "resonance", highest)
+        survey, trial = (
+            evolve(frequency_plan(waves, repeats), name="survey") for repeats in (7, TRIAL_PERIODS)
+        )
+        yield _record(converter, survey, trial, "resonance", highest)
     else:
         yield from _levels(converter, have.resonance, have)
     if hold is not None and have.hold < hold:
@@ -288,16 +287,10 @@ def _levels(
         yield _record(converter, moves, moves, "error", 1.8 * swing)
 
 
-def _brief(plan: Plan[Multisine]) -> Plan[Multisine]:
-    """The waves for few periods."""
-    x, y = (evolve(axis, repeats=TRIAL_PERIODS) for axis in (plan.x, plan.y))
-    return Plan(plan.name, x, y)
-
-
 def _record(
     converter: ConverterLimits,
-    plan: Plan[Waypoints] | Plan[Multisine],
-    trial: Plan[Waypoints] | Plan[Multisine],
+    plan: Plan,
+    trial: Plan,
     identifies: str,
     covers: float,
 ) -> ProposedRecord:
@@ -332,7 +325,7 @@ def _widening(
     return np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
 
 
-def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan[Waypoints]:
+def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan:
     """Two steps of an eighth of the range, or what the upper limit leaves; down where it can be."""
     height = min(converter.swing / 8.0, converter.upper / 2.0)
     down = -1 if converter.lower <= -height else 1
@@ -344,9 +337,9 @@ def _divided(rate: float, wanted: float) -> float:
     return rate / max(1, int(rate / wanted))
 
 
-def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: ConverterLimits) -> Plan[Waveform]:
+def _raised(plan: Plan, converter: ConverterLimits) -> Plan:
     """Drive about the converter's middle."""
     if converter.middle == 0.0:
-        return Plan(plan.name, plan.x, plan.y)
-    x, y = (Raised(wave, converter.middle, RAISED_SECONDS) for wave in (plan.x, plan.y))
-    return Plan(plan.name, x, y)
+        return plan
+    rise = plan.sample_period, converter.middle, RAISED_SECONDS
+    return evolve(plan, x=raised(plan.x, *rise), y=raised(plan.y, *rise))
