@@ -9,10 +9,9 @@ import numpy as np
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
 from afm_scan_ros.core.identification.identify import Identification
-from afm_scan_ros.core.identification.local_response import Complex
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.fit_summary import finding_text
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section

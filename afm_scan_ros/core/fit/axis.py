@@ -16,10 +16,9 @@ from afm_scan_ros.core.fit.alternatives import (
     without_lead,
 )
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
-from afm_scan_ros.core.fit.directions import lost_by
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
-from afm_scan_ros.core.fit.model_of_fit import model_of
+from afm_scan_ros.core.fit.model_of_fit import lost_by, model_of
 from afm_scan_ros.core.fit.modes import add_first_mode, add_mode
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays

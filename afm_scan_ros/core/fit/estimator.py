@@ -18,12 +18,10 @@ from attrs import define, evolve, field, frozen
 from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.evidence import first_scales
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
-from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
+from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode, first_scales
 from afm_scan_ros.core.fit.signals import Signals, noise_of
-from afm_scan_ros.core.fit.simulation import Simulation, simulate
+from afm_scan_ros.core.fit.simulation import Simulation, jacobian, pulled, simulate
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.fit.tones import find_tones, offered_tones
 from afm_scan_ros.core.types import Array

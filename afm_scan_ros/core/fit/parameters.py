@@ -38,6 +38,11 @@ SEARCHED = ("smooth_density", "rough_density", "correction", "output_map", "slop
 """Settings that bound standard deviations, which are those of the greatest evidence."""
 
 
+def first_scales(settings: FitSettings) -> dict[str, float]:
+    """Standard deviations at which the search for those of the greatest evidence begins."""
+    return {name: settings.first_scale * getattr(settings, name) for name in SEARCHED}
+
+
 @frozen(eq=False)
 class Layout:
     """Which parameter is where in θ, and what is known of each beforehand.

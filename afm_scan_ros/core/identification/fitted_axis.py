@@ -9,9 +9,8 @@ from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
-from afm_scan_ros.core.fit.directions import scans
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.model_of_fit import model_of
+from afm_scan_ros.core.fit.model_of_fit import model_of, scans
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.signals import known_from, steps_read_after

@@ -19,7 +19,7 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
-from afm_scan_ros.core.fit.directions import lost_by
+from afm_scan_ros.core.fit.model_of_fit import lost_by
 from afm_scan_ros.core.fit.signals import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation

@@ -9,12 +9,11 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.alternatives import with_one_state
 from afm_scan_ros.core.fit.axis import fit_axis
-from afm_scan_ros.core.fit.descent import settle
+from afm_scan_ros.core.fit.descent import evidence, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.evidence import evidence, first_scales
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.parameters import first_scales, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.told import Knowledge

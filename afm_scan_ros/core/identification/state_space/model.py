@@ -8,13 +8,10 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
-
-Complex = NDArray[np.complex128]
+from afm_scan_ros.core.types import Array, Complex
 
 LINES_AT_ONCE = 4096
 """Of a response: each takes a matrix of its own."""

@@ -14,9 +14,8 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.model import Complex
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 REPEATS = 0.01
 """Share of a drive's power by which it may differ between periods; unlike drives differ by all."""
