@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import FittedAxis, FittedRecord, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy
 from afm_scan_ros.core.types import Array, Complex

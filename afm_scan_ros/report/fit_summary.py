@@ -5,8 +5,7 @@ from typing import Any
 from attrs import asdict
 
 from afm_scan_ros.core.identification import findings as found
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import FittedAxis, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import ModelDiscrepancy, Status
 

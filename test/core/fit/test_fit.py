@@ -18,7 +18,7 @@ from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.fit.uncertainty import covariance
-from afm_scan_ros.core.identification.spread_of_fit import spread_of
+from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction_error import apart
 from afm_scan_ros.core.scanner import forward

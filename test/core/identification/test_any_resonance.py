@@ -7,7 +7,7 @@ from scipy import signal
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, hysteresis_plan
 from afm_scan_ros.core.identification.drives.waveforms import multisine, random_phase_waves
 from afm_scan_ros.core.identification.findings import Hum
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
