@@ -205,7 +205,7 @@ class OneState:
 
         At the highest w a path rises at most as steeply as the drive and falls at least so, at the
         lowest the other way round. Records that never go there tell nothing of these slopes, and w
-        would run away. Returns what ``Growth.lacking`` does.
+        would run away. Returns what ``Plays.lacking`` does.
         """
         tables, found, lacks = theta.reshape(self.shape), [], []
         for table, splines in enumerate(self._leaving()):

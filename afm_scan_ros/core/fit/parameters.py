@@ -20,7 +20,6 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.dynamics import PoleBank
-from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -149,13 +148,9 @@ class Layout:
             result[self.delay_place] = self.least_delay
         return result
 
-    @cached_property
-    def _conditions(self) -> Growth | OneState:
-        return Growth(self.operator) if isinstance(self.operator, Plays) else self.operator
-
     def lacking(self, theta: Array) -> tuple[Array, Array]:
         """Conditions on the operator, where θ fails them: see ``lacking`` of each."""
-        rows, lacks = self._conditions.lacking(self.of_operator(theta))
+        rows, lacks = self.operator.lacking(self.of_operator(theta))
         return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:

@@ -129,21 +129,23 @@ class Signals:
 
         Until then it is what it was at the first sample. ``half_range`` is the operator's (V).
         """
-        drive = _later(self.given, samples)
         first = self.first + samples - self.late if self.first else 0
-        edges = edges_of(
-            drive, self.displacement, self.noise, self.block, first, half_range, settings
-        )
-        moved = evolve(self, drive=drive, edges=edges, first=first)
-        return evolve(moved, late=samples, recorded=self.given)
+        drive = _later(self.given, samples)
+        late = evolve(self, drive=drive, first=first, late=samples, recorded=self.given)
+        return late.stretched(half_range, settings)
 
     def read_after(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record as one whose displacement was read after its drive's updates."""
         if self.ahead:
             return self
-        drive = led(self.drive)
-        given = drive, self.displacement, self.noise, self.block, self.first, half_range, settings
-        return evolve(self, drive=drive, edges=edges_of(*given), ahead=True)
+        return evolve(self, drive=led(self.drive), ahead=True).stretched(half_range, settings)
+
+    def stretched(self, half_range: float, settings: FitSettings) -> "Signals":
+        """Return the record in the longest stretches of blocks over which it is smooth."""
+        both = averaged(self.drive, self.block), averaged(self.displacement, self.block)
+        quiet, begins = self.noise / np.sqrt(self.block), -(-self.first // self.block)
+        edges = smooth_edges(*both, quiet, half_range, begins, settings)
+        return evolve(self, edges=self.block * edges)
 
     def without_drive_noise(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record with its drive less the noise with which that was measured."""
@@ -189,31 +191,15 @@ def signals_of(
     block = longest_block(drive, displacement, noise, settings, every)
     first = known_from(drive, settings, depolarised=record.depolarised or not remembers)
     first = first if first < settings.most_left_out * len(drive) else 0
-    edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
     period, begun = record.sample_period / every, record.depolarised
-    every_sample = record.name, drive, displacement, period
-    held = record.intersample == HELD
-    return Signals(*every_sample, block, first, begun, noise, edges, upsampling=every, held=held)
+    given = record.name, drive, displacement, period, block, first, begun, noise
+    one, held = np.array([0, len(drive)], np.intp), record.intersample == HELD
+    return Signals(*given, one, upsampling=every, held=held).stretched(half_range, settings)
 
 
 def _later(drive: Array, samples: int) -> Array:
     """Return a drive (V), (n,), late by so many samples; at first it is what it began with."""
     return np.concatenate([np.full(samples, drive[0]), drive])[: len(drive)]
-
-
-def edges_of(
-    drive: Array,
-    displacement: Array,
-    noise: float,
-    block: int,
-    first: int,
-    half_range: float,
-    settings: FitSettings,
-) -> Edges:
-    """Edges (samples) of stretches of blocks over which a record is smooth; see ``Signals``."""
-    both = averaged(drive, block), averaged(displacement, block)
-    quiet, begins = noise / np.sqrt(block), -(-first // block)
-    return block * smooth_edges(*both, quiet, half_range, begins, settings)
 
 
 def steps_read_after(record: Record, settings: FitSettings) -> bool:

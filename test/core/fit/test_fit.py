@@ -16,6 +16,7 @@ from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import first_scales, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
+from afm_scan_ros.core.fit.surfaces import everett_surface
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.fit.uncertainty import covariance
 from afm_scan_ros.core.identification.validation import spread_of
@@ -87,7 +88,7 @@ def test_the_model_rests_where_the_plays_do(bias: float) -> None:
     of_model = model_of(AxisFit(layout, records, gain, theta)).hysteresis.surface
     given, start = layout.of_operator(theta), layout.at_rest(theta)[0]
     expected = layout.operator.output(given, np.zeros(1), start)[0]
-    plane = evolve(of_model, offset=layout.operator.surface(given).offset)
+    plane = evolve(of_model, offset=everett_surface(layout.operator, given).offset)
     assert abs(expected) > 1e-3 * LIMIT
     assert Preisach(plane).at_rest().now[1] == pytest.approx(expected, abs=1e-8 * LIMIT)
 

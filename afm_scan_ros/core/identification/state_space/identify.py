@@ -261,7 +261,9 @@ def actuators_of(linear: StateSpaceModel, taught: Teaching) -> Actuators:
         np.sqrt(np.mean(signal**2, axis=(0, 2, 3))) for signal in (moved, periods.drive)
     )
     poles, period = modal_form(linear.a, linear.b, linear.c, linear.d).poles, linear.sample_period
-    decays = -period / np.log(np.abs(poles[(poles.imag > 0.0)]))
+    rates = np.log(poles[poles.imag > 0.0]) / period
+    frequencies, dampings = np.abs(rates) / (2.0 * np.pi), -rates.real / np.abs(rates)
+    decays = 1.0 / (2.0 * np.pi * frequencies * dampings)
     decay = float(np.median(decays)) if len(decays) else period
     return Actuators(drive_scale, elongation / scale[:, np.newaxis], decay, period)
 

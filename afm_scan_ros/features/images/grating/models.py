@@ -17,8 +17,8 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.model_of_fit import direct_of, from_rest
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
+from afm_scan_ros.core.fit.surfaces import direct_of, from_rest
 from afm_scan_ros.core.fit.told import unknown
 from afm_scan_ros.core.model import (
     Added,
