@@ -21,7 +21,7 @@ from afm_scan_ros.core.fit.candidates import (
 from afm_scan_ros.core.fit.descent import LINEAR, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add_mode
-from afm_scan_ros.core.fit.signals import correlation_length
+from afm_scan_ros.core.fit.noise import correlation_length
 from afm_scan_ros.core.types import ProgressCallback
 
 Changed: TypeAlias = Callable[[], AxisFit | None]

@@ -9,6 +9,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.tones import tone_amplitudes
 from afm_scan_ros.core.identification.validation import PREDICTED, Validation
 from afm_scan_ros.core.record import Record
 
@@ -111,7 +112,7 @@ def findings_of(
 
 def _of_records(fit: AxisFit) -> Iterator[Finding]:
     """Yield tones that are larger than the model's error, as smaller ones may be a part of it."""
-    for record, tones in zip(fit.records, fit.tone_amplitudes(), strict=True):
+    for record, tones in zip(fit.records, tone_amplitudes(fit), strict=True):
         error = fit.discrepancy * record.motion
         if large := tuple((tone, size) for tone, size in tones if size > error):
             yield Hum(record.name, large)

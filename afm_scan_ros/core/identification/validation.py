@@ -24,7 +24,7 @@ from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.extension import extended_axis
 from afm_scan_ros.core.fit.model_of_fit import lost_by
-from afm_scan_ros.core.fit.signals import noise_of
+from afm_scan_ros.core.fit.noise import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.intersample import held_voltages, moved_by

@@ -18,6 +18,7 @@ from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
 from afm_scan_ros.core.fit.surfaces import everett_surface
 from afm_scan_ros.core.fit.told import Knowledge
+from afm_scan_ros.core.fit.tones import free_tones
 from afm_scan_ros.core.fit.uncertainty import covariance
 from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import ScannerModel
@@ -149,9 +150,9 @@ def test_a_record_too_short_for_hum_takes_it_from_another() -> None:
     assert PERIOD * len(short) * 50.02 < SETTINGS.tone_cycles
     fit = AxisFit(layout, both, GAIN, theta)
     fit.weigh()
-    assert fit.find_tones()
+    assert free_tones(fit)
     assert [one.tones for one in fit.records] == [pytest.approx([50.02], abs=0.03)] * 2
-    assert not fit.find_tones()
+    assert not free_tones(fit)
     assert [one.tones for one in fit.records] == [pytest.approx([50.02], abs=0.03)] * 2
 
 
