@@ -207,7 +207,7 @@ def response(
     that is sampled too slowly shows no excitation.
     """
     if resonance is None:
-        resonance = response_peak(drive, displacement, sample_period)[1]
+        resonance = response_peak(drive, displacement, sample_period)
     slow_drive, fast_drive = _split(drive, sample_period, 0.5 * resonance)
     slow, fast = _split(displacement, sample_period, 0.5 * resonance)
     gain = float(slow_drive @ slow / (slow_drive @ slow_drive)) if np.any(slow_drive) else 0.0

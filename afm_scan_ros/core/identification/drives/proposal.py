@@ -65,7 +65,7 @@ def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverag
         hold = sample_period * (rest.stop - rest.start)
         return Coverage(hold=hold, gain=gain, creep=_creep(displacement, rest))
     if kind == "frequency":
-        return Coverage(resonance=response_peak(drive, displacement, sample_period)[1])
+        return Coverage(resonance=response_peak(drive, displacement, sample_period))
     turns = np.unique(np.rint(drive[turning_points(drive)] / (APART * swing))) if swing else ()
     if len(turns) >= TURNS:
         return Coverage(loops=swing, gain=gain)
@@ -124,12 +124,11 @@ def _creep(displacement: Array, rest: slice) -> float:
     return max(1.0, late / early) if early else 1.0
 
 
-def response_peak(drive: Array, displacement: Array, sample_period: float) -> tuple[float, float]:
-    """Highest frequency that waves drive, and that of the largest response, both Hz.
+def response_peak(drive: Array, displacement: Array, sample_period: float) -> float:
+    """Frequency (Hz) of the largest response of a displacement (m) to a drive (V), both (n,).
 
-    ``drive`` (V) and ``displacement`` (m) are both (n,), ``sample_period`` is in s. By Welch's
-    averaged spectra, whose lines are a 16th of the record; noise alone is left out where the drive
-    has less than its mean power divided by DRIVEN.
+    By Welch's averaged spectra, whose lines are a 16th of the record; noise alone is left out where
+    the drive has less than its mean power divided by DRIVEN.
     """
     length = len(drive) // 16
     options = {"fs": 1.0 / sample_period, "nperseg": length}
@@ -138,7 +137,7 @@ def response_peak(drive: Array, displacement: Array, sample_period: float) -> tu
     driven = power > power.mean() / DRIVEN
     response = np.where(driven, np.abs(cross) / np.where(driven, power, 1.0), 0.0)
     response[:2] = 0.0
-    return float(frequencies[driven].max()), float(frequencies[response.argmax()])
+    return float(frequencies[response.argmax()])
 
 
 SURVEY_LINES = 25.0

@@ -58,20 +58,14 @@ BEGINNING = Smoothing()
 class Registration:
     """Motion of an image in cells of its grating: ``coefficients`` (count, 2) of u and v.
 
-    ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``noise`` is the rms of the
-    heights that remains, in their unit, ``edges`` that of the places of the cells' edges, in cells.
-    ``weights`` are, for each direction, what each height counts; damaged cells
-    count little. ``shown`` (lines, 2, 2) is the information of each line on u and v, per cell
-    squared. ``pitch`` (m) is the distance between neighbouring cells.
+    ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``shown`` (lines, 2, 2) is the
+    information of each line on u and v, per cell squared. ``pitch`` (m) is the distance between
+    neighbouring cells.
     """
 
     form: MotionForm
     coefficients: Array
     covariance: Array
-    cell: UnitCell
-    noise: float
-    edges: float
-    weights: Sequence[Array]
     shown: Array
     pitch: float
 
@@ -293,10 +287,6 @@ class _State:
             self.form,
             self.coefficients,
             whole.uncertainty(prior, missed, self.weights, _numbers(missed, self.cell)),
-            self.cell,
-            self.noise,
-            self.edges,
-            self.weights,
             np.sum([each.information(likely) for each, likely in pairs], axis=0),
             pitch,
         )
