@@ -135,7 +135,8 @@ def _halves(up: RegisteredImage, down: RegisteredImage, name: str) -> tuple[Inte
         next(each for each in seen.figures if (each.axis, each.name) == ("y", name))
         for seen in (up, down)
     )
-    half = 0.5 * float(np.hypot(*(0.5 * (each.upper - each.lower) for each in (one, other))))
+    width, wide = (0.5 * (each.upper - each.lower) for each in (one, other))
+    half = 0.5 * float(np.hypot(width, wide))
     common, apart = 0.5 * (one.value + other.value), 0.5 * (one.value - other.value)
     return (common, common - half, common + half), (apart, apart - half, apart + half)
 
