@@ -76,13 +76,14 @@ class Positions:
 
 def positions_of(registration: Registration, *, upward: bool = True) -> Positions:
     """Turn the motion in cells into x and y in m."""
-    cells = [registration.image(direction) for direction in range(2)]
+    form = registration.form
+    cells = [form.image(direction, registration.coefficients) for direction in range(2)]
     along = np.sum([each[:, -1] - each[:, 0] for each in cells], axis=0).mean(axis=0)
     cosine, sine = along / np.hypot(*along)
     turn = registration.pitch * np.array([[cosine, -sine], [sine, cosine]])
     middle = np.mean([each.mean(axis=(0, 1)) for each in cells], axis=0)
     found = [(each - middle) @ turn for each in cells]
-    uncertainty = registration.pitch * registration.uncertainty(0)
+    uncertainty = registration.pitch * form.deviation(0, registration.covariance)
     shown = np.einsum("lij,i,j->l", registration.shown, turn[:, 1], turn[:, 1])
     uncertainty[_before_edges(shown, upward=upward)] = np.inf
     return Positions(found[0], found[1], uncertainty)
