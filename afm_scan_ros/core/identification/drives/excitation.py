@@ -80,40 +80,38 @@ def creep_plan(
     return Plan("creep", 1.0 / rate, x, y)
 
 
-@frozen(eq=False)
-class FrequencyLines:
-    """Sines of one period that a frequency record sums.
+def frequency_plan() -> Plan:
+    """A random-phase multisine of low amplitude, seven periods; each axis has phases of its own.
 
-    ``period`` is in samples at ``rate`` Hz, ``lines`` in cycles a period, (m,), ``amplitudes``
-    their relative sizes, (m,), ``peak`` the largest wave's peak, V.
-    """
-
-    rate: float
-    period: int
-    lines: NDArray[np.int64]
-    amplitudes: Array
-    peak: float
-
-
-def default_lines() -> FrequencyLines:
-    """Lines every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz to 2 kHz.
-
-    From 200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
+    Lines every 2 Hz up to 700 Hz resolve the resonance, and others lie every 10 Hz to 2 kHz. From
+    200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
     hysteresis' share in the response small, and spares the amplifier.
     """
     dense, sparse = np.arange(2, 351), np.arange(355, 1001, 5)
     lines = np.concatenate([dense, sparse])
     amplitudes = np.minimum(1.0, 100.0 / lines) * np.where(lines > dense[-1], 2.0, 1.0)
-    return FrequencyLines(20_000.0, 10_000, lines, amplitudes, peak=0.5)
+    return waves_plan("frequency", 20_000.0, 10_000, lines, amplitudes, peak=0.5)
 
 
-def frequency_plan(lines: FrequencyLines | None = None, repeats: int = 7) -> Plan:
-    """A random-phase multisine of low amplitude, repeated; each axis has phases of its own."""
-    sines = default_lines() if lines is None else lines
-    rng, given = np.random.default_rng(1), (sines.lines, sines.amplitudes, sines.period)
-    x, y = (random_phase_waves(*given, rng.random((1, len(sines.lines)))) for _ in range(2))
-    both = (multisine(sines.peak * wave, repeats) for wave in (x, y))
-    return Plan("frequency", 1.0 / sines.rate, *both)
+def waves_plan(
+    name: str,
+    rate: float,
+    period: int,
+    lines: NDArray[np.int64],
+    amplitudes: Array,
+    peak: float,
+    repeats: int = 7,
+) -> Plan:
+    """Sines summed over a ``period`` (samples at ``rate`` Hz) and repeated; phases differ by axis.
+
+    ``lines`` are in cycles a period, (m,), ``amplitudes`` their relative sizes, (m,), ``peak`` is
+    the largest wave's peak, V.
+    """
+    rng = np.random.default_rng(1)
+    x, y = (
+        random_phase_waves(lines, amplitudes, period, rng.random((1, len(lines)))) for _ in range(2)
+    )
+    return Plan(name, 1.0 / rate, multisine(peak * x, repeats), multisine(peak * y, repeats))
 
 
 MOVES = 240

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import gt
-from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.effects.scale import half_range_of
@@ -14,13 +13,12 @@ from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (
     MOVES,
-    FrequencyLines,
     Plan,
     creep_plan,
-    frequency_plan,
     hysteresis_plan,
     scaled,
     validation_plan,
+    waves_plan,
 )
 from afm_scan_ros.core.identification.drives.waveforms import raised
 from afm_scan_ros.core.identification.records.kinds import recognised
@@ -256,10 +254,7 @@ def _lacking(
 ) -> Iterator[ProposedRecord]:
     if have.resonance is None:
         highest = converter.rate / PER_PERIOD
-        waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
-        survey, trial = (
-            evolve(frequency_plan(waves, repeats), name="survey") for repeats in (7, TRIAL_PERIODS)
-        )
+        survey, trial = (_survey(converter, highest, count) for count in (7, TRIAL_PERIODS))
         yield _record(converter, survey, trial, "resonance", highest)
     else:
         yield from _levels(converter, have.resonance, have)
@@ -297,31 +292,25 @@ def _record(
     return ProposedRecord(_raised(plan, converter), _raised(trial, converter), identifies, covers)
 
 
-def _waves(
-    converter: ConverterLimits, highest: float, lowest: float, per_resonance: float
-) -> FrequencyLines:
-    """Lines up to ``highest``, dense enough for a resonance from ``lowest`` on, both Hz.
+def _survey(converter: ConverterLimits, highest: float, repeats: int) -> Plan:
+    """Waves up to ``highest`` (Hz), dense enough for a resonance from the lowest looked for on.
 
-    They fall as 1/f above 0.44 times the lowest resonance, so that the drive seldom turns round;
-    they are raised as they lie farther apart.
+    Each line is driven up to 1.5 times that one, and then as many as grow in proportion to the
+    frequency. They fall as 1/f above 0.44 times it, so that the drive seldom turns round; they are
+    raised as they lie farther apart.
     """
-    period = round(converter.rate * per_resonance / lowest)
-    lines = _widening(period, converter.rate, highest, lowest, per_resonance)
-    corner = 0.44 * lowest * period / converter.rate
-    apart = np.sqrt(np.gradient(lines.astype(np.float64)))
-    amplitudes = np.minimum(1.0, corner / lines) * apart
-    return FrequencyLines(converter.rate, period, lines, amplitudes, converter.swing / 8.0)
-
-
-def _widening(
-    period: int, rate: float, highest: float, lowest: float, per_resonance: float
-) -> NDArray[np.int64]:
-    """Lines (cycles a period), (m,): each up to 1.5 times a frequency, then in proportion to it."""
+    lowest, rate = highest / DECADES, converter.rate
+    period = round(rate * SURVEY_LINES / lowest)
     dense = round(1.5 * lowest * period / rate)
     wide = math.log(highest * period / rate / dense)
-    further = np.arange(1, int(per_resonance * wide) + 1) / per_resonance
+    further = np.arange(1, int(SURVEY_LINES * wide) + 1) / SURVEY_LINES
     sparse = np.rint(dense * np.exp(further)).astype(np.int64)
-    return np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
+    lines = np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
+    corner = 0.44 * lowest * period / rate
+    apart = np.sqrt(np.gradient(lines.astype(np.float64)))
+    amplitudes = np.minimum(1.0, corner / lines) * apart
+    peak = converter.swing / 8.0
+    return waves_plan("survey", rate, period, lines, amplitudes, peak, repeats)
 
 
 def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan:
