@@ -27,6 +27,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import SEARCHED, Layout
 from afm_scan_ros.core.types import Array
 
@@ -55,7 +56,7 @@ def settle(
         fit.stalled = (
             fit.damping > 0.5 * damping and fit.layout.settings.most_steps * fell < fit.near
         )
-        fell -= fit.cover(fell)
+        fell -= cover(fit, fell)
         fit.weigh()
         heavier = max(1.0, before / fit.discrepancy) ** 2
         fit.remaining = heavier * abs(fit.remaining - fell)
@@ -63,6 +64,29 @@ def settle(
         tried += [scales] if near else []
         if chosen and (fit.converged or fit.stalled):
             break
+
+
+def cover(fit: AxisFit, most: float) -> float:
+    """Let the tables of an operator reach as far as its states do; return what that loses.
+
+    Where tables on other cells would raise the objective by ``most`` (nat) or more, those that
+    there are stay: beyond their cells they continue with the values of their edge.
+    """
+    operator = fit.layout.operator
+    if not isinstance(operator, OneState):
+        return 0.0
+    pairs = zip(fit.records, fit.simulated(fit.theta), strict=True)
+    states = [simulation.effective - record.drive for record, simulation in pairs]
+    wider, theta = operator.covering(fit.layout.of_operator(fit.theta), np.concatenate(states))
+    if wider is operator:
+        return 0.0
+    before, kept = fit.objective(fit.theta), (fit.layout, fit.theta)
+    fit.layout = evolve(fit.layout, operator=wider)
+    fit.theta = np.concatenate([theta, fit.theta[len(theta) :]])
+    if (lost := fit.objective(fit.theta) - before) < most:
+        return lost
+    fit.layout, fit.theta = kept
+    return 0.0
 
 
 def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -> float:

@@ -18,7 +18,6 @@ from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.noise import noise_of
-from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode, first_scales
 from afm_scan_ros.core.fit.signals import (
     Free,
@@ -234,27 +233,6 @@ class AxisFit:
                 pull = self.gain * left / variance
                 right += pulled(here[k], pieces, pull[:, np.newaxis])[:, 0]
         return _finite(right)
-
-    def cover(self, most: float) -> float:
-        """Let the tables of an operator reach as far as its states do; return what that loses.
-
-        Where tables on other cells would raise the objective by ``most`` (nat) or more, those that
-        there are stay: beyond their cells they continue with the values of their edge.
-        """
-        operator = self.layout.operator
-        if isinstance(operator, OneState):
-            pairs = zip(self.records, self.simulated(self.theta), strict=True)
-            states = [simulation.effective - record.drive for record, simulation in pairs]
-            given = self.layout.of_operator(self.theta)
-            wider, theta = operator.covering(given, np.concatenate(states))
-            if wider is not operator:
-                before, kept = self.objective(self.theta), (self.layout, self.theta)
-                self.layout = evolve(self.layout, operator=wider)
-                self.theta = np.concatenate([theta, self.theta[len(theta) :]])
-                if (lost := self.objective(self.theta) - before) < most:
-                    return lost
-                self.layout, self.theta = kept
-        return 0.0
 
     def weigh(self) -> None:
         """Estimate the noise of records whose blocks are samples, and η: the likeliest."""
