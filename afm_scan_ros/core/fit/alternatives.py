@@ -6,11 +6,11 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
+from attrs import evolve
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.fit.candidates import (
     begun_at_rest,
-    counted_whole,
     evidence_left_out,
     read_after,
     read_late,
@@ -46,7 +46,9 @@ def better(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     other = _preferred(fit, partial(with_one_state, fit), progress, "one state")
     if other is fit:
         return fit
-    other = with_rest(counted_whole(other), progress)
+    whole = [evolve(one, first=0) for one in other.records]
+    other = AxisFit(other.layout, whole, other.gain, other.theta, other.discrepancy, other.scales)
+    other = with_rest(other, progress)
     while add_mode(other):
         settle(other, other.layout.settings.most_steps, searching=True)
     return _with_any_sensor(other, progress)

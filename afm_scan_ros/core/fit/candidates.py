@@ -1,6 +1,6 @@
 """Fits of the same records in another way: other starts, reading, sensor or operator."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from copy import copy
 from functools import partial
 from itertools import count
@@ -15,7 +15,6 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add, add_first_mode, add_mode, further_modes
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.score_test import FoundMode
-from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.simulation import at_rest
 from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import Array
@@ -46,18 +45,6 @@ def rest_of(fit: AxisFit) -> Array:
     if any(one.rested for one in fit.records):
         return fit.theta[fit.layout.parts["rest"]]
     return fit.layout.operator.depolarised(fit.layout.of_operator(fit.theta))
-
-
-def each_of_own_start(records: Sequence[Signals]) -> list[Signals]:
-    """Return records of which each that did not begin at rest has an unknown start of its own."""
-    places = count()
-    return [one if one.rested else evolve(one, unknown=next(places)) for one in records]
-
-
-def counted_whole(fit: AxisFit) -> AxisFit:
-    """Return a fit of which each record counts from its first sample on."""
-    records = [evolve(one, first=0) for one in fit.records]
-    return AxisFit(fit.layout, records, fit.gain, fit.theta, fit.discrepancy, fit.scales)
 
 
 def evidence_left_out(fit: AxisFit) -> float:
@@ -234,7 +221,8 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     fit = _without_creep(fit)
     layout, paths, rest = fit.layout, [], at_rest(fit.layout, fit.theta)
     quiet = [one.without_drive_noise(layout.operator.half, layout.settings) for one in fit.records]
-    records, resting = each_of_own_start(quiet), begun_at_rest(fit, range(len(fit.records)))
+    places, resting = count(), begun_at_rest(fit, range(len(fit.records)))
+    records = [one if one.rested else evolve(one, unknown=next(places)) for one in quiet]
     for record, simulation in zip(records, resting.simulated(resting.theta), strict=True):
         both = record.drive, simulation.effective - rest
         drive, output = (averaged(one, record.block)[record.used] for one in both)

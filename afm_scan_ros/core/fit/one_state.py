@@ -72,7 +72,8 @@ class OneState:
     def precision(self, _name: str, scales: Mapping[str, float]) -> Array:
         """Third differences along both sides are small, and all slopes of order one."""
         rows, columns = self.shape[1:]
-        along, across = (_third(size) for size in (rows, columns))
+        thirds = (np.diff(np.eye(size), n=3, axis=0) for size in (rows, columns))
+        along, across = (each.T @ each for each in thirds)
         rough = np.kron(along, np.eye(columns)) + np.kron(np.eye(rows), across)
         bent = rough / scales["slopes"] ** 2 + np.eye(len(rough)) / self.settings.slopes**2
         return np.asarray(np.kron(np.eye(2), bent))
@@ -243,8 +244,3 @@ class OneState:
         ends = self.lower, self.upper
         offset = self.lower - float(rest[0])
         return DuhemSlopes(*ends, offset, 0.0, self.widths, slope, rising, falling)
-
-
-def _third(size: int) -> Array:
-    third = np.diff(np.eye(size), n=3, axis=0)
-    return np.asarray(third.T @ third)

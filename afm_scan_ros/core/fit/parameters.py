@@ -207,12 +207,8 @@ class Layout:
         result[self.parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
         return result
 
-    def of_any_gain(self, precision: Array) -> Array:
-        """Return a prior's precision without the condition that V(0) is one."""
-        return np.asarray(precision - self._unit_gain)
-
     @cached_property
-    def _unit_gain(self) -> Array:
+    def unit_gain(self) -> Array:
         """Precision of V(0) about one: to its order, or exactly where the operator has the gain."""
         exact = 1.0 if self.linear else float(np.finfo(np.float32).eps)
         return np.asarray(np.outer(self.static, self.static) / exact)
@@ -245,7 +241,7 @@ class Layout:
             known = np.arange(parts["map"].stop)
             matrix[known, known] += np.finfo(np.float32).eps ** -2.0
             mean[: parts["map"].start] = self.operator.unbent()
-        matrix += self._unit_gain
+        matrix += self.unit_gain
         mean[parts["lags"].start] = 1.0
         first, last = parts["modes"].start, parts["modes"].stop
         mean[first:last:4] = theta[first:last:4]

@@ -70,7 +70,7 @@ class ScoreTest:
         precision, mean = wider.layout.prior(fit.scales, wider.theta)
         apart = precision @ (wider.theta - mean)
         if not self.with_operator:
-            precision = wider.layout.of_any_gain(precision)
+            precision = precision - wider.layout.unit_gain
         whole = self._matrix + precision[np.ix_(within_wider, within_wider)]
         try:
             factor = cho_factor(layout.conditioned(whole))

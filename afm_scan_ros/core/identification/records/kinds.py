@@ -114,7 +114,7 @@ def _stepping(parts: list[Stretch]) -> list[Stretch]:
 def _kind(drive: Array) -> str:
     """Recognise what moves without long holds."""
     drive = _turning(drive)
-    if _sweeps(drive):
+    if is_sweep(drive) and _frequency_ratio(drive) > SWEPT and not _has_one_rate(drive):
         return "sweep"
     if is_periodic(drive[:, np.newaxis]):
         return "scan" if _has_one_rate(drive) else "multisine"
@@ -128,11 +128,6 @@ def is_sweep(drive: Array) -> bool:
     envelope = np.abs(analytic)
     turning = np.abs(np.diff(analytic))
     return bool(np.abs(np.diff(envelope)).sum() < SINGLE * turning.sum())
-
-
-def _sweeps(drive: Array) -> bool:
-    """Whether a drive is one sine whose frequency changes."""
-    return is_sweep(drive) and _frequency_ratio(drive) > SWEPT and not _has_one_rate(drive)
 
 
 def _is_binary(drive: Array) -> bool:
@@ -195,16 +190,11 @@ def is_periodic(drive: Array) -> bool:
     return bool(_runs(drive, repetition(drive)))
 
 
-def _periods(signal: Array, period: int) -> Array:
-    """Cut a signal, (n, channels), into periods of so many samples, (periods, period, channels)."""
-    count = len(signal) // period
-    return signal[: count * period].reshape(count, period, signal.shape[1])
-
-
 def _runs(drive: Array, period: int) -> list[NDArray[np.int64]]:
     if not period:
         return []
-    drives = _periods(drive, period)
+    count = len(drive) // period
+    drives = drive[: count * period].reshape(count, period, *drive.shape[1:])
     apart = np.abs(np.diff(drives, axis=0)).max(axis=(1, 2), initial=0.0)
     moving = np.ptp(drives[1:], axis=1).max(axis=1, initial=0.0) > 0.0
     steady = 1 + np.flatnonzero((apart <= EQUAL * np.ptp(drive)) & moving)

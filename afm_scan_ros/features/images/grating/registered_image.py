@@ -114,7 +114,9 @@ def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...
     (scale, change), (angle, slant) = (
         _halves(up, down, name) for name in ("scale", "angle to a right one")
     )
-    metres = float(np.mean([_speed(each) for each in (up, down)])) * NANO
+    images = up.image, down.image
+    speeds = [each.range_y / (each.lines * (each.line_time or np.inf)) for each in images]
+    metres = float(np.mean(speeds)) * NANO
     across = (metres * float(np.tan(np.radians(each))) for each in slant)
     return (
         ImageQuantity("scale without drift", "y", "1", *scale),
@@ -122,11 +124,6 @@ def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...
         ImageQuantity("drift", "y", "nm/s", *(metres * each for each in change)),
         ImageQuantity("drift", "x", "nm/s", *across),
     )
-
-
-def _speed(one: RegisteredImage) -> float:
-    """Commanded speed of y, m/s."""
-    return one.image.range_y / (one.image.lines * (one.image.line_time or np.inf))
 
 
 def _halves(up: RegisteredImage, down: RegisteredImage, name: str) -> tuple[Interval, Interval]:
