@@ -1,7 +1,6 @@
 """Records of a scanner → the model of each axis, by one fit of all that there are of it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 
 import numpy as np
 from attrs import evolve, frozen
@@ -116,25 +115,18 @@ def identify_records(
     for axis in present:
         of_axis = [record.axis(axis) for record in given if axis in record.axes]
         counted = _counted(progress, axis, len(axes), len(present))
-        with _naming(axis):
+        try:
             axes[axis] = identify_axis(of_axis, axis, counted, linear=linear)
+        except InputError as error:
+            raise InputError(f"{axis}: {error}") from error
+        except ScanError as error:
+            raise ScanError(f"{axis}: {error}") from error
     return Identification(axes)
 
 
 def _counted(progress: ProgressCallback, axis: str, done: int, total: int) -> ProgressCallback:
     """Name the axis in each message, and count the axes that are over."""
     return lambda message: progress(Step(f"{axis}: {message}", done, total))
-
-
-@contextmanager
-def _naming(axis: str) -> Iterator[None]:
-    """Begin what is raised by the axis' name."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{axis}: {error}") from error
-    except ScanError as error:
-        raise ScanError(f"{axis}: {error}") from error
 
 
 def identify_axis(
