@@ -11,8 +11,7 @@ from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import FittedAxis, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text

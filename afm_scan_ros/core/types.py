@@ -8,6 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+Complex: TypeAlias = NDArray[np.complex128]
 
 AXES = ("x", "y")
 

@@ -10,7 +10,6 @@ from attrs import asdict, frozen
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waveforms import Sampled, Waveform
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array
@@ -39,9 +38,7 @@ def make_folder(folder: Path, names: Iterable[str]) -> None:
             raise InputError(f"{path} exists already: give another folder or remove it")
 
 
-def write_drives(
-    folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str] = AXES
-) -> Iterator[Path]:
+def write_drives(folder: Path, plans: Sequence[Plan], axes: Sequence[str] = AXES) -> Iterator[Path]:
     """Write each drive as ``NAME.csv`` and ``NAME.npz``, and yield the former's path as it is done.
 
     The text has the columns ``drive_x_v`` and ``drive_y_v`` (V, those of ``axes``) and one row a
@@ -53,7 +50,7 @@ def write_drives(
         yield target
 
 
-def _write(target: Path, plan: Plan[Waveform], axes: Sequence[str]) -> None:
+def _write(target: Path, plan: Plan, axes: Sequence[str]) -> None:
     blocks: list[Array] = []
     with replacing(target) as beside, beside.open("w", encoding="utf-8") as file:
         file.write(",".join(f"drive_{axis}_v" for axis in axes) + "\n")
@@ -66,7 +63,7 @@ def _write(target: Path, plan: Plan[Waveform], axes: Sequence[str]) -> None:
         np.savez_compressed(beside, drive_v=np.vstack(blocks), sample_period_s=period)
 
 
-def save_drive(folder: Path, plan: Plan[Waveform]) -> Path:
+def save_drive(folder: Path, plan: Plan) -> Path:
     """Write the drive of both axes as ``NAME.npz``, as ``write_drives`` does, and return its path.
 
     It is not compressed: nodes read it at once.
@@ -79,7 +76,7 @@ def save_drive(folder: Path, plan: Plan[Waveform]) -> Path:
     return target
 
 
-def read_drive(path: Path) -> Plan[Sampled]:
+def read_drive(path: Path) -> Plan:
     """Read the drive of both axes from ``NAME.npz``; its name is that of the file.
 
     Raises InputError naming the file where it holds none.
@@ -98,7 +95,7 @@ def read_drive(path: Path) -> Plan[Sampled]:
         )
     if period.size != 1 or not 0.0 < float(period.item()) < np.inf:
         raise InputError(f"{path}: {PERIOD}: give one positive number")
-    return Plan(path.stem, *(Sampled(float(period.item()), drive[:, n].copy()) for n in (0, 1)))
+    return Plan(path.stem, float(period.item()), *np.ascontiguousarray(drive.T))
 
 
 LARGEST = 2**16

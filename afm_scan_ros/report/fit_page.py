@@ -10,12 +10,10 @@ from attrs import asdict
 
 from afm_scan_ros.core.effects.vibration import held
 from afm_scan_ros.core.identification.findings import Finding
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
-from afm_scan_ros.core.identification.identify import Identification
-from afm_scan_ros.core.identification.local_response import Complex
+from afm_scan_ros.core.identification.identify import FittedAxis, FittedRecord, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, Status
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import (
     BLUE,
