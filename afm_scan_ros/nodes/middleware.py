@@ -15,17 +15,13 @@ from afm_scan_ros.nodes.shared_memory import MEMORY, clear
 FAST_DDS, CYCLONE = "rmw_fastrtps_cpp", "rmw_cyclonedds_cpp"
 
 
-OF_NODES, OF_VIEWERS = "fastdds.xml", "fastdds_viewer.xml"
-"""Profiles of Fast DDS in ``config``. By those of viewers, which have UDP alone, no node has a
-queue in shared memory for a viewer that may be stopped or killed."""
-
-
 def prepare(
-    environment: MutableMapping[str, str] = os.environ, profiles: str = OF_NODES
+    environment: MutableMapping[str, str] = os.environ, *, viewing: bool = False
 ) -> list[str]:
     """Set the middleware up and clear what dead processes left; return warnings, a sentence each.
 
-    With Fast DDS the ``profiles`` are a file of ``config``.
+    Who is only ``viewing`` gets no shared memory with Fast DDS, where the nodes are known to be on
+    this computer: Fast DDS at times waits 2 s to send to a process with such that was stopped.
 
     Call it before ``rclpy.init``, and write the warnings before it too: a file in shared memory
     that could not be removed may hang it. Raises FileNotFoundError for a broken installation.
@@ -34,7 +30,7 @@ def prepare(
     if name == CYCLONE:
         return _prepare_cyclone(environment)
     if name == FAST_DDS:
-        return [*_prepare_fast_dds(environment, profiles), *clear(), *lacks_room()]
+        return [*_prepare_fast_dds(environment, viewing=viewing), *clear(), *lacks_room()]
     tried = f"{FAST_DDS} and {CYCLONE} were"
     return [f"RMW_IMPLEMENTATION={name} was not tried with this package; {tried}"]
 
@@ -79,6 +75,7 @@ def _is_file(path: Path) -> bool:
         return False
 
 
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 """Variable that Fast DDS 2.14 reads, when the first participant is made."""
 NEWER = "FASTDDS_DEFAULT_PROFILES_FILE"
@@ -100,7 +97,7 @@ KEPT = 15_000
 _HOLDS_UP = "a viewer that is slow, stopped or killed can hold up the scan"
 
 
-def _prepare_fast_dds(environment: MutableMapping[str, str], profiles: str) -> list[str]:
+def _prepare_fast_dds(environment: MutableMapping[str, str], *, viewing: bool) -> list[str]:
     """Let Fast DDS read our profiles, unless it reads the user's."""
     ours = share_directory() / "config"
     said, files = [], []
@@ -112,7 +109,10 @@ def _prepare_fast_dds(environment: MutableMapping[str, str], profiles: str) -> l
     if environment.get("SKIP_DEFAULT_XML_FILE") != "1" and Path(LOCAL).is_file():
         files.append(Path(LOCAL).absolute())
     if not files:
-        environment[PROFILES] = str(ours / profiles)
+        environment[PROFILES] = str(ours / "fastdds.xml")
+        if viewing and environment.get(RANGE) == "LOCALHOST":
+            environment[PROFILES] = str(ours / "fastdds_viewer.xml")
+            environment[RANGE] = "SYSTEM_DEFAULT"  # ROS adds shared memory for LOCALHOST
     return [*said, *(sentence for file in files for sentence in lacking(file, environment))]
 
 
@@ -149,7 +149,7 @@ def _lacks_memory(root: ET.Element, environment: Mapping[str, str]) -> Iterator[
         for each in root.iter("transport_descriptor")
         if _text(each.find("type")) == "SHM" and _text(each.find("transport_id")) in used
     )
-    added = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+    added = environment.get(RANGE) == "LOCALHOST"
     if (memory := next(memories, None)) is not None:
         if (size := _number(memory.find("segment_size"))) < SEGMENT:
             yield f"segment_size is {size:.0f}: give at least {SEGMENT}"

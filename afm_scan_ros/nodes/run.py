@@ -103,12 +103,12 @@ def _report_refusal(kind: type[ScanNode], error: InputError) -> None:
     node.destroy_node()
 
 
-def join(arguments: list[str] | None = None, profiles: str = middleware.OF_NODES) -> None:
+def join(arguments: list[str] | None = None, *, viewing: bool = False) -> None:
     """Join ROS with the arguments of a command line, by default this process's.
 
     What is to be known of the middleware goes to stderr before, since it may be why joining hangs.
     """
-    for warning in middleware.prepare(profiles=profiles):
+    for warning in middleware.prepare(viewing=viewing):
         sys.stderr.write(f"{warning}\n")
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

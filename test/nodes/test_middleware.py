@@ -23,8 +23,8 @@ from afm_scan_ros.nodes.middleware import (
     KEPT,
     LOCAL,
     NEWER,
-    OF_VIEWERS,
     PROFILES,
+    RANGE,
     SEGMENT,
     URI,
     lacking,
@@ -162,9 +162,10 @@ def test_fast_dds_gets_our_profile_and_again_no_other() -> None:
 
 
 def test_a_viewer_of_a_node_has_no_shared_memory() -> None:
-    environment: dict[str, str] = {}
+    environment = {RANGE: "LOCALHOST"}
     prepare(environment)
-    assert prepare(environment, OF_VIEWERS) == []
+    assert prepare(environment, viewing=True) == []
+    assert environment[RANGE] != "LOCALHOST"
     file = Path(environment[PROFILES])
     tree = ET.parse(file)  # noqa: S314 - our own file
     kinds = [element.text for element in tree.iter() if element.tag.endswith("}type")]

@@ -20,7 +20,6 @@ from afm_scan_ros.features.view.handover import MISSING
 from afm_scan_ros.features.view.screen import ERROR, Screen, open_screen
 from afm_scan_ros.features.view.viewer import WINDOW, ViewSettings
 from afm_scan_ros.nodes import topics
-from afm_scan_ros.nodes.middleware import OF_VIEWERS
 from afm_scan_ros.nodes.peers import DONE, FAILED, RUNNING
 from afm_scan_ros.nodes.run import join
 
@@ -30,7 +29,7 @@ CURVES = {DESIRED: "desired", ACHIEVED: "achieved", ERROR: "error", DRIVE: "driv
 
 def listen(where: str, settings: ViewSettings, wanted: Callable[[], bool]) -> None:
     """Show scan after scan as long as it is ``wanted``; in a file, the first alone."""
-    join([], OF_VIEWERS)
+    join([], viewing=True)
     try:
         node, executor = Node(f"afm_scan_view_{os.getpid()}"), SingleThreadedExecutor()
         shown = ShownNodes(where, settings)
