@@ -17,7 +17,7 @@ from attrs import AttrsInstance, define, field, fields, frozen, has
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scan_spec import LARGEST_RANGE, ScanSpec
 from afm_scan_ros.core.streams import WholeLines
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -290,3 +290,19 @@ class Scan:
         meter = TrackingMeter(self.spec, displacement)
         meter.add(self.desired, self.true if displacement == "true" else self.measured)
         return meter.tracking()
+
+
+def sensor_doubt(axis: str, moved: float, lowest: float, highest: float) -> str:
+    """Return a sentence where an axis that is moved stands still, or goes too far; else nothing.
+
+    ``moved`` is the peak-to-peak of its drive or desired displacement; the achieved displacement
+    goes from ``lowest`` to ``highest``, m.
+    """
+    if moved > 0.0 and lowest == highest:
+        return f"{axis}: the achieved displacement is constant: see that the sensor is connected"
+    if highest - lowest > LARGEST_RANGE:
+        return (
+            f"{axis}: the achieved displacement spans {highest - lowest:.3g} m, a scanner's"
+            f" {LARGEST_RANGE:g} m at most: see to the sensor's scale"
+        )
+    return ""
