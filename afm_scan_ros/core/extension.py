@@ -15,8 +15,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.intersample import HELD, voltages_of
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.settings import setting
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Array, Trace, setting
 
 
 @frozen

@@ -20,8 +20,7 @@ from scipy.fft import next_fast_len
 
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.settings import setting
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Array, Trace, setting
 
 HELD, BAND_LIMITED = "held", "band_limited"
 INTERSAMPLE = (HELD, BAND_LIMITED)

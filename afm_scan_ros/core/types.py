@@ -1,10 +1,11 @@
-"""Frozen records and array types used by the whole package."""
+"""What the whole package uses: arrays, runs of samples, progress, and fields of settings."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
-from attrs import frozen
+from attrs import define, field, frozen
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
@@ -35,6 +36,40 @@ class Step(str):
     def left(self, elapsed: float) -> float | None:
         """Return how long (s) the rest takes at the pace so far; None before any part is over."""
         return elapsed * (self.total - self.done) / self.done if self.done else None
+
+
+@define
+class Tally:
+    """Counts the parts of a search, of which more are planned as it goes on.
+
+    Parts that are ``named`` apart, as those of each axis, are counted together.
+    """
+
+    _progress: ProgressCallback
+    _name: str = ""
+    _counts: Counter[str] = field(factory=Counter)
+
+    def named(self, name: str) -> "Tally":
+        """Return a tally that begins what it says with a name."""
+        return Tally(self._progress, f"{self._name}{name}", self._counts)
+
+    def plan(self, parts: int) -> None:
+        """Count parts that are to be done, or fewer of them where ``parts`` is negative."""
+        self._counts["planned"] += parts
+
+    def begin(self, doing: str, parts: int = 1) -> None:
+        """Say what is being done, which takes so many of the parts that are planned."""
+        done, planned = self._counts["done"], self._counts["planned"]
+        self._progress(Step(f"{self._name}{doing}", done, planned, more=True))
+        self._counts["done"] += parts
+
+
+def setting(default: float, unit: str, meaning: str, source: str) -> Any:  # noqa: ANN401 - as attrs.field
+    """Return the field of a settings class; the page of settings is written from it.
+
+    ``source`` is the argument or the publication that the default follows from.
+    """
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "source": source})
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:

@@ -46,8 +46,7 @@ from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import synchronised
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import ProgressCallback, Tally
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts in the order of severity; the scanner has the most severe of its axes."""
