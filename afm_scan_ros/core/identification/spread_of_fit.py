@@ -24,7 +24,7 @@ from afm_scan_ros.core.fit.signals import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation
 from afm_scan_ros.core.model import AxisModel, band_edges
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array

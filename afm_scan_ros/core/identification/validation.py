@@ -9,10 +9,10 @@ from attrs import evolve, frozen
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import extended_axis
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.intersample import held_voltages, moved_by
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
+from afm_scan_ros.core.prediction import extended_axis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array

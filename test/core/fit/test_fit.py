@@ -21,7 +21,7 @@ from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.fit.uncertainty import covariance
 from afm_scan_ros.core.identification.spread_of_fit import spread_of
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (
