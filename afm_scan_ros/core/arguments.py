@@ -1,14 +1,17 @@
-"""Checks of what a user gives, with errors that say what to give instead."""
+"""Checks of what a user gives, and of fits to it, with errors that say what to give instead."""
 
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Kind = TypeVar("Kind")
 
@@ -109,3 +112,17 @@ def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
             f"{what} has {channels} channel{'s' * (channels > 1)}, but the axes are"
             f" {', '.join(axes)}: give shape (n, {len(axes)})"
         )
+
+
+def require_converged(found: "OptimizeResult", what: str) -> Array:
+    """Return the parameters of what ``scipy.optimize.least_squares`` found.
+
+    Raises ScanError that names ``what`` was fitted where its evaluations did not suffice.
+    """
+    if not found.success:
+        raise ScanError(
+            f"{what}: the fit has not converged after {found.nfev} evaluations: see that drive and"
+            " displacement of the record belong together, or record it longer"
+        )
+    parameters: Array = found.x
+    return parameters

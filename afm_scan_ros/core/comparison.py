@@ -9,11 +9,11 @@ import numpy as np
 from attrs import evolve, field, frozen
 from scipy.optimize import least_squares
 
+from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.metrics import METRES, Figure, Scan, Tracking
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scanner import predict

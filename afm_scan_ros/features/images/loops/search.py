@@ -17,10 +17,10 @@ from scipy.optimize import least_squares
 from scipy.signal import argrelmin
 from scipy.stats import t as student
 
+from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.fit.signals import correlation_length
-from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import NormalEquations, solve
