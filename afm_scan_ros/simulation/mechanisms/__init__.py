@@ -3,11 +3,9 @@
 from importlib.metadata import entry_points
 
 from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a module registers its kinds
-    amplifier,
-    elapsed,
+    electronics,
     environment,
     material,
-    sensor,
     structure,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
