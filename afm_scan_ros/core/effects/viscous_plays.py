@@ -224,20 +224,6 @@ def _apply(
 
 
 @compiled
-def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: Array) -> None:
-    """Fill the means of p and q (2, n, plays) over each hold, and move the blocks."""
-    decays, (share, _, a) = np.zeros_like(blocks), law
-    for i in range(places.size):
-        for k in range(thresholds.size):
-            drawn = _drawn(blocks[0, k], places[i], thresholds[k])
-            pull = drawn - blocks[0, k]
-            decays[1, k] = math.exp(-abs(pull) / a)
-            result[0, i, k] = drawn - _remaining(pull, share, a, decays[1, k])[0]
-            result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
-        _draw(places[i], thresholds, law, blocks, decays)
-
-
-@compiled
 def _invert(
     surface: Surface,
     memory: tuple[Array, int, Array],
@@ -305,16 +291,6 @@ class ViscousPlays(CausalInverse):
         blocks, places = state[1].copy(), self._place(np.append(state[0].now[INPUT], block))
         _apply(places[0], self._plays, self._law, blocks, places[1:], result)
         return (memory, blocks), result
-
-    def followed(self, block: Array) -> Array:
-        """Means of p and q over each hold (2, n, plays), in cells, for inputs u (V) from rest on.
-
-        They follow from the thresholds alone, whatever the curves.
-        """
-        blocks = self.at_rest()[1]
-        result = np.empty((2, len(block), blocks.shape[1]))
-        _follow(self._place(block), self._plays[0], self._law, blocks, result)
-        return result
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""
