@@ -119,6 +119,22 @@ class CausalInverse(ABC):
         return np.empty(0)
 
 
+class Recursion(CausalInverse):
+    """Base of effects that step from sample to sample, and whose inverse solves the same steps."""
+
+    @abstractmethod
+    def run(self, state: Any, block: Array, direction: float) -> tuple[Any, Array]:  # noqa: ANN401
+        """State after a block, and its outputs where ``direction`` is 1, its inputs where -1."""
+
+    def apply(self, state: Any, block: Array) -> tuple[Any, Array]:  # noqa: ANN401
+        """Outputs for a block of inputs, both (n,)."""
+        return self.run(state, block, 1.0)
+
+    def invert(self, state: Any, block: Array) -> tuple[Any, Array]:  # noqa: ANN401
+        """Inputs for a block of outputs, both (n,)."""
+        return self.run(state, block, -1.0)
+
+
 class StatelessEffect(CausalInverse):
     """Base of effects whose output depends on the present input alone; the state is None.
 

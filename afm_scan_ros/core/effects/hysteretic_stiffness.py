@@ -21,11 +21,11 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element, Recursion
 from afm_scan_ros.core.effects.effect_type import (
     EffectForm,
     EffectParameter,
@@ -57,21 +57,15 @@ SHARES = tuple(
 )
 
 
-@frozen(eq=False)
-class Loop:
-    """State: of the resonance ``inner`` (2,), the ``plays`` (m), last force f and last x (m)."""
-
-    inner: Array
-    plays: Array
-    force: float
-    last: float
+State = tuple[Array, Array, float, float]
+"""Of the resonance (2,), of the plays (m), the last force f and the last x (m)."""
 
 
 @compiled
 def _run(
     system: tuple[Array, Array, Array],
     material: tuple[Array, Array, float],
-    state: tuple[Array, Array, float, float],
+    state: State,
     block: Array,
     direction: float,
     result: Array,
@@ -100,7 +94,7 @@ def _run(
     return force, last
 
 
-class HystereticStiffness(CausalInverse):
+class HystereticStiffness(Recursion):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
     ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
@@ -116,23 +110,16 @@ class HystereticStiffness(CausalInverse):
         thresholds, shares, balance = material
         self._material = thresholds, shares, balance * float(shares.sum())
 
-    def at_rest(self) -> Loop:
+    def at_rest(self) -> State:
         """State at rest at zero, all plays in the middle."""
-        return Loop(np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0)
+        return np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0
 
-    def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
-        """Displacement x for a block of x₀, both (n,) in m."""
-        return self._ran(state, block, 1.0)
-
-    def invert(self, state: Loop, block: Array) -> tuple[Loop, Array]:
-        """Displacement x₀ that gives a block of x, both (n,) in m."""
-        return self._ran(state, block, -1.0)
-
-    def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
-        inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
-        moving = inner, plays, state.force, state.last
+    def run(self, state: State, block: Array, direction: float) -> tuple[State, Array]:
+        """State, and displacement x for x₀ or x₀ for x, both (n,) in m."""
+        inner, plays, result = state[0].copy(), state[1].copy(), np.empty_like(block)
+        moving = inner, plays, *state[2:]
         ended = _run(self._system, self._material, moving, block, direction, result)
-        return Loop(inner, plays, *ended), result
+        return (inner, plays, *ended), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:
