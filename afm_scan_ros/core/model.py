@@ -29,7 +29,7 @@ from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.spread import Spread
-from afm_scan_ros.core.types import AXES, floats
+from afm_scan_ros.core.types import AXES, floats, pair
 
 __all__ = [
     "INVERSES",
@@ -87,10 +87,6 @@ def closed(name: str, interval: Range, unit: str) -> ParameterInterval:
     return ParameterInterval(name, unit, lower, upper)
 
 
-def _range(given: Range | None) -> Range | None:
-    return None if given is None else (float(given[0]), float(given[1]))
-
-
 @frozen
 class EffectStatus:
     """How one effect is known, and over which drive (V), frequencies (Hz) and hold times (s).
@@ -101,9 +97,9 @@ class EffectStatus:
     """
 
     status: Status = field(default=Status.IDENTIFIED, converter=Status)
-    drive: Range | None = field(default=None, converter=_range)
-    frequencies: Range | None = field(default=None, converter=_range)
-    hold_times: Range | None = field(default=None, converter=_range)
+    drive: Range | None = field(default=None, converter=optional_converter(pair))
+    frequencies: Range | None = field(default=None, converter=optional_converter(pair))
+    hold_times: Range | None = field(default=None, converter=optional_converter(pair))
     intervals: tuple[ParameterInterval, ...] = ()
     identifiable_from: str = ""
 

@@ -6,7 +6,7 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 from attrs import define, field, frozen
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -75,6 +75,17 @@ def setting(default: float, unit: str, meaning: str, source: str) -> Any:  # noq
 def floats(values: Iterable[float]) -> tuple[float, ...]:
     """Return any run of numbers as a tuple of floats, which compares by value."""
     return tuple(float(value) for value in values)
+
+
+def pair(values: Iterable[float]) -> tuple[float, float]:
+    """Return two numbers as a tuple of floats."""
+    first, second = values
+    return float(first), float(second)
+
+
+def contiguous(values: ArrayLike) -> Array:
+    """Return numbers as an array of the kind that compiled loops are made for."""
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def by_value(array: Array | None) -> tuple[tuple[int, ...], bytes] | None:

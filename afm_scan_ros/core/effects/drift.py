@@ -33,11 +33,6 @@ def settles(time: Array) -> Array:
     return np.asarray(-np.expm1(-time))
 
 
-def slows(time: Array) -> Array:
-    """A logarithm."""
-    return np.asarray(np.log1p(time))
-
-
 @frozen
 class Drift(Recursion):
     """Motion with time; the state is the index of the next sample."""
@@ -103,6 +98,6 @@ def drift() -> EffectType:
         confusable=("periodic_disturbance", "slow_creep"),
         forms=(
             form("", settles, text="exponential", example=(1e-7, 30.0)),
-            form("logarithmic", slows, example=(1e-7, 0.5), text="", refines=""),
+            form("logarithmic", np.log1p, example=(1e-7, 0.5), text="", refines=""),
         ),
     )

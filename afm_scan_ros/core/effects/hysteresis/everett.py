@@ -1,14 +1,12 @@
 """The Everett surface: half the change of output along each first-order reversal curve."""
 
-from typing import Any
-
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.converters import optional
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError, SampleError
-from afm_scan_ros.core.types import Array, by_value
+from afm_scan_ros.core.types import Array, by_value, contiguous, pair
 
 ROUNDING = 1e-12
 """Share of a range by which sums of some thousand terms may be rounded beyond it."""
@@ -26,15 +24,6 @@ class BeyondRangeError(SampleError):
         )
         self.value = value
         self.limit = limit
-
-
-def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a matrix
-    return np.ascontiguousarray(values, dtype=np.float64)
-
-
-def _pair(values: Any) -> tuple[float, float]:  # noqa: ANN401 - whatever holds two numbers
-    lower, upper = values
-    return float(lower), float(upper)
 
 
 @frozen
@@ -58,11 +47,11 @@ class EverettSurface:
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
-    values: Array = field(converter=_matrix, eq=by_value)
+    values: Array = field(converter=contiguous, eq=by_value)
     offset: float = field(converter=float)
     bias: float | None = field(default=None, converter=optional(float))
-    uneven: Array | None = field(default=None, converter=optional(_matrix), eq=by_value)
-    within: tuple[float, float] | None = field(default=None, converter=optional(_pair))
+    uneven: Array | None = field(default=None, converter=optional(contiguous), eq=by_value)
+    within: tuple[float, float] | None = field(default=None, converter=optional(pair))
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)
