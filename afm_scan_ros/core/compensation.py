@@ -14,7 +14,7 @@ from afm_scan_ros.core.errors import SampleError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import SMALLEST_RANGE, ScanSpec
-from afm_scan_ros.core.scanner import Coupling, InverseState, compensator
+from afm_scan_ros.core.scanner import Coupling, InverseState, chain_of
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -66,7 +66,7 @@ class Compensation:
         chosen = frozenset(inverses)
         self._axes = model.axes
         self._effects = [
-            compensator(model.axis(name), sample_period, chosen, settings).effects
+            chain_of(model.axis(name)).compensator(sample_period, chosen, settings).effects
             for name in self._axes
         ]
         self._coupling = Coupling(model, sample_period, self._axes if chosen else ())

@@ -67,13 +67,8 @@ def sum_of(parts: Iterable[SampledCoupling], sample_period: float) -> SampledCou
     return SampledCoupling(*linear, sample_period, curvature=sum(curvatures))
 
 
-@frozen(eq=False)
-class CoupledState:
-    """The next sample, and the coupling states of x and of y."""
-
-    next_sample: int
-    x: Array
-    y: Array
+CoupledState = tuple[int, Array, Array]
+"""The next sample, and the coupling states of x and of y."""
 
 
 class CoupledSystem:
@@ -89,7 +84,7 @@ class CoupledSystem:
 
     def at_rest(self) -> CoupledState:
         """State of axes that have long rested at zero."""
-        return CoupledState(0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b))
+        return 0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b)
 
     def solve(self, before: CoupledState, target: Trace) -> tuple[CoupledState, Trace]:
         """Return the own displacement (m) of each axis for a target (m) of both.
@@ -97,19 +92,18 @@ class CoupledSystem:
         Raises ScanError naming the sample, counted from the first ever solved, where the two
         equations have no solution that the motion reaches from rest.
         """
-        states = before.x.copy(), before.y.copy()
+        first, states = before[0], (before[1].copy(), before[2].copy())
         own = np.empty_like(target.x), np.empty_like(target.y)
         systems = self._to_x.system, self._to_y.system
         solved = _solve(systems, states, (target.x, target.y), own)
         if solved < len(target.x):
             x, y = (1e6 * float(axis[solved]) for axis in (target.x, target.y))
             raise ScanError(
-                f"sample {before.next_sample + solved}: at x = {x:.6g} um, y = {y:.6g} um the"
+                f"sample {first + solved}: at x = {x:.6g} um, y = {y:.6g} um the"
                 " cross_coupling of both axes has no inverse: scan a smaller range, or remove"
                 " cross_coupling from one axis of the model"
             )
-        after = CoupledState(before.next_sample + solved, *states)
-        return after, Trace(target.first_sample, target.sample_period, *own)
+        return (first + solved, *states), Trace(target.first_sample, target.sample_period, *own)
 
 
 def _modes_of_inverse(to_x: SampledCoupling, to_y: SampledCoupling) -> NDArray[np.complex128]:

@@ -3,12 +3,12 @@
 The displacements of coupled axes are x = x_own + Cx(y_own),    y = y_own + Cy(x_own)
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import CoupledSystem, sum_of
@@ -17,7 +17,7 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.intersample import HELD
-from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
+from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -41,13 +41,6 @@ def chain_of(axis: AxisModel) -> Chain:
 def forward(axis: AxisModel, sample_period: float) -> Cascade:
     """Return the model of one axis, from drive (V) to its own displacement (m)."""
     return chain_of(axis).forward(sample_period)
-
-
-def compensator(
-    axis: AxisModel, sample_period: float, inverses: Iterable[str], settings: InverseSettings
-) -> Cascade:
-    """Return the cascade whose inverse compensates the effects named; see ``Chain``."""
-    return chain_of(axis).compensator(sample_period, inverses, settings)
 
 
 States = dict[str, Array]
@@ -115,13 +108,8 @@ class Coupling:
         return {"x": x_after, "y": y_after}, (to_x, to_y)
 
 
-@frozen(eq=False)
-class Predicted:
-    """How far a prediction has come: the states of both axes, of their coupling, and behind it."""
-
-    own: dict[str, Any]
-    coupling: States
-    output: dict[str, Any]
+Predicted = tuple[dict[str, Any], States, dict[str, Any]]
+"""How far a prediction has come: the states of both axes, of their coupling, and behind it."""
 
 
 class Prediction:
@@ -142,17 +130,17 @@ class Prediction:
             {name: cascade.at_rest() for name, cascade in cascades.items()}
             for cascades in (self._own, self._output)
         )
-        return Predicted(own, self._coupling.at_rest(), output)
+        return own, self._coupling.at_rest(), output
 
     def advance(self, before: Predicted, drive: Trace) -> tuple[Predicted, Trace]:
         """Return the state after a block, and the displacement during it.
 
         Raises BeyondRangeError where the drive leaves the identified range.
         """
-        own, alone = _applied(self._own, before.own, drive)
-        coupling, both = self._coupling.apply(before.coupling, alone)
-        output, displacement = _applied(self._output, before.output, both)
-        return Predicted(own, coupling, output), displacement
+        own, alone = _applied(self._own, before[0], drive)
+        coupling, both = self._coupling.apply(before[1], alone)
+        output, displacement = _applied(self._output, before[2], both)
+        return (own, coupling, output), displacement
 
 
 def _applied(

@@ -126,7 +126,7 @@ class LineError:
     max_y: float
 
 
-class ErrorLines:
+class LineErrors:
     """Aligns desired with achieved displacement, and yields each complete line's error.
 
     Holds one line and the blocks in flight; samples outside the lines are dropped.
@@ -135,8 +135,14 @@ class ErrorLines:
     def __init__(self, lines: range, samples_per_line: int) -> None:
         self._aligner = Aligner((DESIRED, ACHIEVED))
         self._whole = WholeLines(lines, samples_per_line, len(AXES))
+        self._firsts = lines[::samples_per_line]
 
-    def add(self, name: str, block: Trace) -> Iterator[tuple[int, Array]]:
+    def add(self, name: str, block: Trace) -> Iterator[LineError]:
+        """Take a block of one of the two topics; yield the lines that it makes whole."""
+        for number, line in self.samples(name, block):
+            yield line_error(number, self._firsts[number], line)
+
+    def samples(self, name: str, block: Trace) -> Iterator[tuple[int, Array]]:
         """Take a block of one of the two topics; yield the lines that it makes whole.
 
         Each is its number and its error (m) in x and y, (2, samples_per_line), which the next line
@@ -146,19 +152,6 @@ class ErrorLines:
         for desired, achieved in self._aligner.ready():
             error = np.stack([achieved.x - desired.x, achieved.y - desired.y])
             yield from self._whole.add(desired.first_sample, error)
-
-
-class LineErrors:
-    """Yields the figures of the error of each complete line."""
-
-    def __init__(self, lines: range, samples_per_line: int) -> None:
-        self._lines = lines[::samples_per_line]
-        self._errors = ErrorLines(lines, samples_per_line)
-
-    def add(self, name: str, block: Trace) -> Iterator[LineError]:
-        """Take a block of one of the two topics; yield the lines that it makes whole."""
-        for number, line in self._errors.add(name, block):
-            yield line_error(number, self._lines[number], line)
 
 
 def line_error(number: int, first_sample: int, error: Array) -> LineError:
