@@ -38,11 +38,7 @@ def all_of_type(kind: type[Kind], name: str, given: Iterable[Kind], fix: str) ->
 
 
 def samples(what: str, given: ArrayLike) -> Array:
-    """Return finite numbers of shape (n, channels), float64, each channel contiguous.
-
-    ``given`` has that shape, or (n,) for one channel; ``what`` names it in the InputError that is
-    raised for anything else.
-    """
+    """Return numbers (n,) or (n, channels) as the latter; an InputError names ``what`` is wrong."""
     try:
         array = np.asarray(given)
     except ValueError as error:
@@ -115,10 +111,7 @@ def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
 
 
 def require_converged(found: "OptimizeResult", what: str) -> Array:
-    """Return the parameters of what ``scipy.optimize.least_squares`` found.
-
-    Raises ScanError that names ``what`` was fitted where its evaluations did not suffice.
-    """
+    """Return what ``least_squares`` found; raises ScanError where it has not converged."""
     if not found.success:
         raise ScanError(
             f"{what}: the fit has not converged after {found.nfev} evaluations: see that drive and"

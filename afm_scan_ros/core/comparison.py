@@ -31,10 +31,7 @@ def residual_of(model: ScannerModel, scan: Scan, axis: str) -> Array:
 
 
 def with_own_parameters(model: ScannerModel, scan: Scan) -> ScannerModel:
-    """Return the model with the parameters that differ in every record fitted to a scan.
-
-    A model without such parameters is returned as it is.
-    """
+    """Return the model with the parameters that differ in every record fitted to a scan."""
     for axis in AXES:
         if places := _own(model, axis):
             model = _fitted(model, scan, axis, places)

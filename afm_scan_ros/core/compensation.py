@@ -223,12 +223,9 @@ Ranges = dict[str, float]
 def preflight(
     compensation: Compensation, spec: ScanSpec, samples: int, learned: Correction | None = None
 ) -> Generator[str, None, None]:
-    """Invert the first ``samples`` of a scan in pieces; yield before each what is being done.
+    """Invert the first ``samples`` of a scan, with what was ``learned``; yield what is being done.
 
-    ``learned`` is what changes its reference, if anything does.
-
-    Raises ScanError naming sample, axis and value where the drive leaves the model's identified
-    range or a limit.
+    Raises ScanError naming sample, axis and value where the drive leaves the range or a limit.
     """
     progress = compensation.at_rest()
     stop: Stop = None
@@ -246,10 +243,9 @@ def largest_ranges(
 ) -> Generator[str, None, Ranges]:
     """Largest ranges (m) up to those of ``spec`` with which the scan's drive can be had.
 
-    x is found first, with y at rest, and then y, so that both hold together; all else of the scan
-    stays. Each is bisected to ``RESOLUTION``, as a larger range needs a larger drive: at most 17
-    inversions of ``SEARCHED`` samples, and one or a few of all. Empty where no range will do, for
-    the preparation needs too much by itself. Yields what is being done, as ``preflight``.
+    x is found first, with y at rest, and then y, each bisected to ``RESOLUTION``: at most 17
+    inversions of ``SEARCHED`` samples, and one or a few of all. Empty where the preparation needs
+    too much by itself. Yields what is being done, as ``preflight``.
     """
     samples = min(samples, total_samples(spec))
     found = dict.fromkeys(AXES, SMALLEST_RANGE)

@@ -89,17 +89,10 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def regrouped(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a loop whose sums may be taken in any order, several at a time.
-
-    Its results differ by rounding from those in the order as written.
-    """
+    """Compile a loop whose sums may be taken in any order, which changes them by rounding."""
     return Compiled(function, regroups=("reassoc", "contract", "nsz"))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function as part of each loop that calls it.
-
-    For what runs every sample with arrays: a call of its own counts references to them, which
-    takes longer than a few sums.
-    """
+    """Compile a function as part of each loop that calls it, for what runs every sample."""
     return Compiled(function, "always")

@@ -46,10 +46,7 @@ class Correction:
         return self.follow(None, desired(self.spec, 0, len(self.x)))[1]
 
     def follow(self, stop: Stop, block: Trace) -> tuple[Stop, Trace]:
-        """Return the state after a block of the desired displacement, and its reference.
-
-        Of a scan that is stopped the correction fades out as the trajectory does.
-        """
+        """Return the state after a desired block, and its reference; it fades out at a stop."""
         first, count = block.first_sample, len(block.x)
         if stop is None:
             stop = self._stop_in(block)

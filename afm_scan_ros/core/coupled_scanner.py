@@ -146,8 +146,7 @@ class CoupledScanner:
     def predict(self, drive: Array, *, periodic: bool) -> Array:
         """Displacement (samples, p) of a drive (samples, m), from rest or as one whole period.
 
-        Raises InputError for a drive beyond the reach or the band, ScanError where the simulation
-        does not settle.
+        Raises InputError for a drive beyond reach or band, ScanError where it does not settle.
         """
         for sample, channel in np.argwhere(np.abs(drive) > self.reach)[:1]:
             raise InputError(
@@ -166,9 +165,8 @@ class CoupledScanner:
     def invert(self, desired: Array, *, periodic: bool) -> Array:
         """Drive (samples, m) of a displacement (samples, p), from rest or as one whole period.
 
-        Raises InputError for a displacement beyond the band, or which needs a drive before it
-        begins or after it ends, ScanError where the inverse does not settle or leaves more than
-        the model's error.
+        Raises InputError for one beyond the band, or not at rest at its ends, and ScanError where
+        the inverse does not settle or leaves more than the model's error.
         """
         self._refuse_out_of_band("desired", desired)
         run = len(desired)

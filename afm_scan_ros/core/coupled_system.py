@@ -89,8 +89,7 @@ class CoupledSystem:
     def solve(self, before: CoupledState, target: Trace) -> tuple[CoupledState, Trace]:
         """Return the own displacement (m) of each axis for a target (m) of both.
 
-        Raises ScanError naming the sample, counted from the first ever solved, where the two
-        equations have no solution that the motion reaches from rest.
+        Raises ScanError naming the sample where no solution can be reached from rest.
         """
         first, states = before[0], (before[1].copy(), before[2].copy())
         own = np.empty_like(target.x), np.empty_like(target.y)
@@ -107,10 +106,7 @@ class CoupledSystem:
 
 
 def _modes_of_inverse(to_x: SampledCoupling, to_y: SampledCoupling) -> NDArray[np.complex128]:
-    """Eigenvalues of both axes' coupling states, while the target is zero.
-
-    Raises InputError where the shares alone leave no inverse.
-    """
+    """Eigenvalues of the inverse at rest; InputError where the shares alone leave no inverse."""
     left = 1.0 - to_x.d * to_y.d
     if not left > 0.0:
         raise InputError(

@@ -44,10 +44,9 @@ def most_pixels(spec: ScanSpec) -> int:
 
 
 def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
-    """Return what a scan images of its lines, all but the overscan at each end.
+    """Return what a scan images of its lines from ``left`` (m) on, all but the overscan.
 
-    ``left`` is the line's lowest x in m, ``-range_x / 2`` by default. Raises InputError for a
-    pattern without lines, and for more pixels than a trace has samples.
+    Raises InputError for a pattern without lines, and for more pixels than a trace has samples.
     """
     if spec.pattern not in TO_AND_FRO:
         raise InputError(
@@ -66,8 +65,7 @@ def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
 def pixel_means(position: Array, values: Array, frame: Frame) -> Array:
     """Mean over each pixel of values at rising positions (m), straight between them.
 
-    A pixel at the end that the positions cover only in part has the mean over that part; one that
-    they do not reach, in a scan that was stopped, is NaN.
+    Of a pixel that they cover in part, over that part; NaN where they do not reach it.
     """
     edges = np.clip(frame.edges, position[0], position[-1])
     corners = np.union1d(position, edges)

@@ -293,11 +293,7 @@ class Scan:
 
 
 def sensor_doubt(axis: str, moved: float, lowest: float, highest: float) -> str:
-    """Return a sentence where an axis that is moved stands still, or goes too far; else nothing.
-
-    ``moved`` is the peak-to-peak of its drive or desired displacement; the achieved displacement
-    goes from ``lowest`` to ``highest``, m.
-    """
+    """Return a sentence where an axis that is ``moved`` stands still, or goes too far (m)."""
     if moved > 0.0 and lowest == highest:
         return f"{axis}: the achieved displacement is constant: see that the sensor is connected"
     if highest - lowest > LARGEST_RANGE:

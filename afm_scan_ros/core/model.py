@@ -179,10 +179,9 @@ class ModelDiscrepancy:
 
 
 def band_edges(sample_period: float, resonance: float) -> tuple[float, ...]:
-    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart.
+    """Edges (Hz) of a signal's bands, a factor of 1.4 to 3 apart, up to the Nyquist frequency.
 
-    ``resonance`` (Hz) is the first of the model. The last edge is the Nyquist frequency; the others
-    have three digits.
+    ``resonance`` (Hz) is the first of the model.
     """
     nyquist, edges = 0.5 / sample_period, (edge_at(edge, resonance) for edge in EDGES)
     return (*(edge for edge in edges if edge < NARROWEST * nyquist), nyquist)

@@ -42,11 +42,7 @@ SHARE = ExtensionSettings().share
 
 
 def extended(model: ScannerModel, drive: Trace, share: float = SHARE) -> ScannerModel:
-    """Return the model with a wider range for each axis whose drive (V) leaves the identified one.
-
-    It is wider by a share of the voltages at its ends. Where a drive goes farther, the range stays,
-    and does not hold it.
-    """
+    """Return the model with wider ranges for axes whose drive (V) leaves them, by a share at most."""
     axes = {n: extended_axis(model.axis(n), getattr(drive, n), share) for n in model.axes}
     return evolve(model, **axes)
 
@@ -100,10 +96,7 @@ def _wider(operator: HysteresisOperator, share: float) -> HysteresisOperator:
 
 
 def _surface(surface: EverettSurface, share: float) -> EverettSurface:
-    """Add a level above an upper end over 0 V, and one below a lower end under 0 V.
-
-    Up to these E goes on straight. The output at depolarised rest stays the same.
-    """
+    """Add levels beyond both ends, up to which E goes on straight; the output at rest stays."""
     grown = 1.0 + share
     levels, values = surface.levels, np.tril(surface.values)
     if surface.upper > 0.0:
@@ -144,9 +137,7 @@ def standard_deviation(
 ) -> Trace:
     """Standard deviation (m) of a motion predicted for a drive (V), without the sensor's noise.
 
-    It is more where the drive leaves the identified range, by a share at most. Of a model without a
-    ``Spread`` it is the rms error of the whole motion. Raises InputError where an axis states no
-    error.
+    Without a ``Spread`` it is the rms error of the motion. InputError where an axis has none.
     """
     given = drive.sample_period, share, intersample
     found = {
@@ -185,8 +176,7 @@ def apart(
 ) -> Array:
     """What a standard deviation in each direction adds to a prediction (m), (directions, n).
 
-    Effects that were added to the axis are left out: they change it by far less than it is. Where
-    no record tells how far the motion lies from rest, it is about the mean.
+    Effects that were added to the axis are left out. About the mean, where the rest is not known.
     """
     given = drive, sample_period, share, intersample
     middle = _moved(axis, spread.centre, *given)

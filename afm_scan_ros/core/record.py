@@ -137,10 +137,7 @@ class Record:
         kind: str | None = None,
         start: str = "unknown",
     ) -> "Record":
-        """Return the record of a run of drive (V) and displacement (m), of some of its axes.
-
-        Raises InputError where the two are not sampled at one period.
-        """
+        """Return the record of a run of drive (V) and displacement (m) at one sample period."""
         period = drive.sample_period
         if displacement.sample_period != period:
             raise InputError(
@@ -166,11 +163,7 @@ class Record:
         return evolve(self, drive=drive, displacement=displacement, axes=(name,))
 
     def part(self, first: int, last: int) -> "Record":
-        """Return the samples from ``first`` to before ``last``, which are of no whole scan.
-
-        Only a part that begins with the record begins in a state that is known. Raises InputError
-        where the record does not hold all of these samples, or there are none.
-        """
+        """Return the samples from ``first`` to before ``last``; InputError where it lacks any."""
         if not 0 <= first < last <= len(self.drive):
             raise InputError(
                 f"{self.name or 'record'}: has no samples from {first} to before {last}: it holds"
@@ -203,10 +196,7 @@ class Record:
             LOG.warning("%s", shortcoming)
 
     def traces(self) -> tuple[Trace, Trace]:
-        """Return drive (V) and displacement (m) of both axes; an absent axis is zero.
-
-        Raises InputError for other axes than x and y.
-        """
+        """Return drive (V) and displacement (m) of x and y, 0 if absent; InputError for others."""
         if not set(self.axes) <= set(AXES):
             raise InputError(
                 f"{self.name or 'record'}: its axes are {', '.join(self.axes)}: name them x and y,"

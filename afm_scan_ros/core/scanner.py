@@ -23,11 +23,7 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 def chain_of(axis: AxisModel) -> Chain:
-    """Return the chain of one axis.
-
-    Raises InputError for an effect that the catalogue lacks, or that cannot stand beside those
-    before it, named by its place.
-    """
+    """Return the chain of one axis; raises InputError at the effect that cannot stand in it."""
     chain = Chain(axis)
     for place, added in enumerate(axis.added):
         try:
@@ -88,10 +84,7 @@ class Coupling:
         return self._coupled.at_rest() if self._coupled else self.at_rest()
 
     def invert(self, state: InverseState, target: Trace) -> tuple[InverseState, Trace]:
-        """Own displacement of each axis (m) for a target (m) of both.
-
-        Raises InputError where the inverse is unstable, ScanError where a sample has none.
-        """
+        """Own displacement (m) of each axis for a target (m) of both; InputError where unstable."""
         if self._none:
             return state, target
         if self._coupled:
@@ -133,10 +126,7 @@ class Prediction:
         return own, self._coupling.at_rest(), output
 
     def advance(self, before: Predicted, drive: Trace) -> tuple[Predicted, Trace]:
-        """Return the state after a block, and the displacement during it.
-
-        Raises BeyondRangeError where the drive leaves the identified range.
-        """
+        """Return state and displacement after a block; BeyondRangeError beyond the range."""
         own, alone = _applied(self._own, before[0], drive)
         coupling, both = self._coupling.apply(before[1], alone)
         output, displacement = _applied(self._output, before[2], both)
@@ -154,11 +144,7 @@ def _applied(
 
 
 def synchronised(model: ScannerModel, record: Record) -> Record:
-    """Return a record as one of a displacement that is read just before the drive's updates.
-
-    It was read as those were that the model was identified from. A drive that is not held has no
-    updates.
-    """
+    """Return a record with a held drive as if it were read just before the drive's updates."""
     if record.intersample != HELD:
         return record
     drive = record.drive.copy()
@@ -169,9 +155,6 @@ def synchronised(model: ScannerModel, record: Record) -> Record:
 
 
 def predict(model: ScannerModel, drive: Trace) -> Trace:
-    """Displacement (m) of a whole record from its drive (V), from depolarised rest at zero.
-
-    Raises BeyondRangeError where the drive leaves the identified range.
-    """
+    """Displacement (m) for a drive (V) from rest; BeyondRangeError beyond the identified range."""
     prediction = Prediction(model, drive.sample_period)
     return prediction.advance(prediction.at_rest(), drive)[1]

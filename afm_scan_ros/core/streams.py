@@ -40,11 +40,7 @@ def cut(trace: Trace) -> Iterator[Trace]:
 
 
 def cut_as(blocks: Iterable[Trace], trace: Trace) -> Iterator[Trace]:
-    """Yield a trace cut where blocks end, and as ``cut`` does.
-
-    Where it begins or ends before these blocks, as late readings of them do, so does what is
-    yielded.
-    """
+    """Yield a trace cut where blocks end, and as ``cut`` does; what lies before and after, too."""
     start = trace.first_sample
     for block in blocks:
         stop = max(start, min(end(block), end(trace)))
@@ -93,10 +89,9 @@ class WholeLines:
         self._line = np.empty((rows, size))
 
     def add(self, first: int, run: Array) -> Iterator[tuple[int, Array]]:
-        """Take the scan's samples from number ``first`` on, (rows, n), which follow the last ones.
+        """Take samples from number ``first`` on, (rows, n), which follow the last ones.
 
-        Yields each line that they make whole: its number and its samples, (rows, size), which the
-        next line takes the place of.
+        Yields each whole line: its number and its samples, (rows, size), overwritten by the next.
         """
         size = self._line.shape[1]
         position, stop = max(first, self._lines.start), min(first + run.shape[1], self._lines.stop)
@@ -143,11 +138,7 @@ class LineErrors:
             yield line_error(number, self._firsts[number], line)
 
     def samples(self, name: str, block: Trace) -> Iterator[tuple[int, Array]]:
-        """Take a block of one of the two topics; yield the lines that it makes whole.
-
-        Each is its number and its error (m) in x and y, (2, samples_per_line), which the next line
-        takes the place of.
-        """
+        """Yield each whole line's number and error (m), (2, samples), overwritten by the next."""
         self._aligner.add(name, block)
         for desired, achieved in self._aligner.ready():
             error = np.stack([achieved.x - desired.x, achieved.y - desired.y])

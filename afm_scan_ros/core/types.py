@@ -65,10 +65,7 @@ class Tally:
 
 
 def setting(default: float, unit: str, meaning: str, source: str) -> Any:  # noqa: ANN401 - as attrs.field
-    """Return the field of a settings class; the page of settings is written from it.
-
-    ``source`` is the argument or the publication that the default follows from.
-    """
+    """Return the field of a settings class; its default follows from the ``source``."""
     return field(default=default, metadata={"unit": unit, "meaning": meaning, "source": source})
 
 

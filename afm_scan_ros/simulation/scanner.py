@@ -178,8 +178,7 @@ def _held(bank: base.Bank) -> Callable[[Any, Array, float], tuple[Any, Array]]:
 def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
     """Reading (m) of the true displacement (m): a whole number of quanta.
 
-    Draws one normal number a sample and axis, in the samples' order, so that the readings do not
-    depend on how they are cut into blocks. Raises ScanError where the span is too small.
+    Draws one number a sample and axis, in their order. Raises ScanError beyond the span.
     """
     noise = spec.noise_rms * rng.standard_normal((true.x.size, len(AXES)))
     x, y = (_convert(spec, true, axis, noise[:, i]) for i, axis in enumerate(AXES))
@@ -233,9 +232,8 @@ class Piezoscanner:
     def advance(self, drive: Trace) -> tuple[Trace, Trace]:
         """Measured and true displacement (m) for a block of drive (V) that follows the last one.
 
-        Raises InputError for a gap, a repeated or empty block, unequal axes or another sample
-        period, and ScanError, naming sample, axis and value, beyond a limit of amplifier or
-        sensor. A block that is refused leaves the scanner where it was.
+        Raises InputError for a misplaced block, and ScanError, naming sample, axis and value, at a
+        limit of amplifier or sensor. A block that is refused leaves the scanner where it was.
         """
         self._refuse_misplaced(drive)
         self._spec.amplifier.limits.refuse_beyond(drive, self._drive)

@@ -174,10 +174,7 @@ each step squares the error, two reach rounding."""
 def solved(
     curve: Callable[[Array], tuple[Array, Array]], levels: Array, heights: Array, wanted: Array
 ) -> Array:
-    """Where a rising curve has the heights ``wanted`` (n,), by Newton's method from a table of it.
-
-    ``curve`` gives height and slope, and goes on straight beyond its ``levels``.
-    """
+    """Where a rising ``curve``, of height and slope, has the heights wanted, by Newton's method."""
     found = np.interp(wanted, heights, levels)
     for _ in range(NEWTON_STEPS):
         height, slope = curve(found)

@@ -115,11 +115,7 @@ def starts_modal(features: ResidualFeatures) -> Iterator[tuple[float, float, flo
 
 
 def starts_coupled_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
-    """The share that the residual holds, with modes as of a light structure.
-
-    A coupled mode near the stage's own resonance splits it in two, so the first step of a fit from
-    a share near zero points in a wrong direction.
-    """
+    """The share that the residual holds: from one near zero a fit goes in a wrong direction."""
     (share,) = amounts(features.residual, features.other)
     for small, frequency, damping in starts_dynamic(features):
         yield max(small, SHARE.nearest(share)), frequency, damping

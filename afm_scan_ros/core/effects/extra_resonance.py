@@ -109,8 +109,7 @@ def starts_series_mode(features: ResidualFeatures) -> Iterator[tuple[float, floa
 def starts_absorber_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
-    A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
-    the residual shows the resonance and no mode.
+    A heavy one moves the resonance so far that the residual shows it and no mode.
     """
     seen = likely_modes(_predicted(features), features.residual, features.sample_period, SEEN)
     for mass, mode in (*product((0.1,), seen), *product(MASSES, HEAVY)):
@@ -123,10 +122,7 @@ def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, 
 
 
 def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
-    """For some dampings, the period by which the prediction's ringing reduces the residual most.
-
-    The comparison uses all spectral lines, because a periodic drive has only a few.
-    """
+    """For some dampings, the period whose ringing reduces the residual most, over all lines."""
     window, period = (
         scipy.signal.windows.hann(len(features.residual), sym=False),
         features.sample_period,

@@ -70,10 +70,7 @@ def _run(
     direction: float,
     result: Array,
 ) -> tuple[float, float]:
-    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
-
-    Each period has the force at its middle. Forwards, its end is predicted with the last force.
-    """
+    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x."""
     (a, b, c), (inner, plays, force, last) = system, state
     thresholds, shares, missing = material
     pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
@@ -133,10 +130,7 @@ def insert_spectrum(chain: Chain, values: Array) -> Chain:
 
 
 def spectrum(shares: Sequence[float], scale: float = 1.0) -> tuple[Array, Array]:
-    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``.
-
-    ``scale`` is that of lengths.
-    """
+    """Thresholds (m) and shares of elements with such shares about the ``KNOTS`` of a ``scale``."""
     knots = np.log(scale * np.array(KNOTS))
     levels = np.linspace(knots[0], knots[-1], ELEMENTS)
     hats = np.stack([np.interp(levels, knots, peak) for peak in np.eye(len(KNOTS))])
@@ -162,8 +156,7 @@ def _with_element(chain: Chain, make: Callable[..., HystereticStiffness], values
 def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Thresholds from far below the motion to about as large, each a minimum of its own.
 
-    A base model counts nothing of what yields as missing, or all of it; what lies between fits
-    any threshold half, and leads away from the true one.
+    A base model counts nothing of what yields as missing, or all of it.
     """
     reach = 0.5 * float(np.ptp(features.displacement))
     for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):

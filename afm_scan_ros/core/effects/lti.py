@@ -101,10 +101,7 @@ def pole_of(lag: float) -> float:
 
 
 def mean_over_holds(pole: complex, sample_period: float) -> SampledSystem:
-    """Return the system of gain 1 from a held input to its mean over each hold.
-
-    ``pole`` is in rad/s; of a complex one the conjugate is a pole too. -inf lets all pass.
-    """
+    """System of gain 1 from a held input to its mean, of a pole (rad/s) or a pair; -inf: none."""
     turn = pole * sample_period
     passed = -np.expm1(turn)
     mean = -passed / turn * (1.0 + 1j * pole.real / pole.imag if pole.imag else 1.0)

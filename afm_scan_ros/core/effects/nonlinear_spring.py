@@ -44,11 +44,7 @@ def _run(
     direction: float,
     result: Array,
 ) -> tuple[float, float]:
-    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
-
-    Forwards, the force at the end of a period depends on the x there, and is found by two steps of
-    Newton's method from the force before.
-    """
+    """From x₀ to x by two of Newton's steps a sample, or from x to x₀ (-1); return last f and x."""
     (a, b, c), (inner, force, last), (square, cube) = system, state, spring
     pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
     before = -(square * last**2 + cube * last**3)
@@ -90,10 +86,7 @@ class NonlinearSpring(Recursion):
         return np.zeros(2), 0.0, 0.0
 
     def run(self, state: State, block: Array, direction: float) -> tuple[State, Array]:
-        """State, and displacement x for x₀ or x₀ for x, both (n,) in m.
-
-        Raises ScanError where x grows without bound, as of a spring that turns back.
-        """
+        """State, and x for x₀ or x₀ for x (m); raises ScanError where x grows without bound."""
         inner, result = state[0].copy(), np.empty_like(block)
         moving = inner, *state[1:]
         ended = _run(self._system, self._spring, moving, block, direction, result)

@@ -189,8 +189,7 @@ def sampled_kernel(response: Response, weight: Weight, sample_period: float, siz
 def optimal_kernel(response: Response, weight: Weight, sample_period: float) -> Kernel:
     """Impulse response of the optimal inverse, on a grid long enough to hold both its ends.
 
-    ``response`` gives G at angular frequencies 0 to π/T. Raises InputError where the response
-    does not die out, as under a weight with a step, stating the tail.
+    Raises InputError where it does not die out, as under a weight with a step, stating the tail.
     """
     size = SHORTEST
     while True:

@@ -28,10 +28,7 @@ from afm_scan_ros.core.errors import InputError
 
 
 def symmetric(declared: Iterable[EffectType]) -> tuple[EffectType, ...]:
-    """Effects in alphabetical order, each confusable with all that either of the two declares.
-
-    Raises InputError where one is confusable with itself or with an effect that there is not.
-    """
+    """Effects in alphabetical order, each confusable with all that either of the two declares."""
     known = {each.name: each for each in declared}
     confusable = defaultdict(set)
     for each in known.values():

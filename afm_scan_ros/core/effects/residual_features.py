@@ -78,10 +78,7 @@ def prominent_lines(
 
 
 def amounts(residual: Array, *shapes: Array) -> Array:
-    """Least-squares amount of each shape (n,) in a residual (n,), an offset apart.
-
-    A shape that never changes gets 0.
-    """
+    """Least-squares amount of each shape (n,) in a residual (n,), an offset apart; or 0."""
     centred = np.stack([shape - shape.mean() for shape in shapes], axis=1)
     size = np.linalg.norm(centred, axis=0)
     size[size == 0.0] = 1.0

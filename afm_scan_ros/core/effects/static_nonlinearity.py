@@ -96,10 +96,7 @@ class StaticNonlinearity(StatelessEffect):
         return self._bend(inputs)[0]
 
     def input(self, outputs: Array) -> Array:
-        """Straight displacement x₀ (m) that gives x (m), both (n,); or the same of volts.
-
-        Raises SampleError where Newton's method has not converged, as for a target that is NaN.
-        """
+        """Straight displacement for x, or volts, (n,); SampleError unless Newton has converged."""
         found = solved(self._bend, self._straight, self._bent, outputs)
         missed = ~(np.abs(self._bend(found)[0] - outputs) <= EXACT * self.reach)
         if missed.any():

@@ -74,11 +74,7 @@ class VibrationModel:
 
     @cached_property
     def resonant_pole(self) -> complex | None:
-        """Pole (rad/s) of the resonance that rises highest, None where there is no resonance.
-
-        It is the stage's own: a light structure on it, or a broad pair of poles, may lie lower in
-        frequency.
-        """
+        """Pole (rad/s) of the resonance that rises highest: the stage's own. None without one."""
         poles = np.roots(self.denominator)
         poles = poles[(poles.imag > 0.0) & (-poles.real < OSCILLATES * np.abs(poles))]
         if not poles.size:
@@ -138,11 +134,7 @@ scanner lies ahead of it, 1e-11 on the default plant."""
 
 @lru_cache(maxsize=64)
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
-    """Sample G behind a zero-order hold, exactly.
-
-    Time is first scaled by the poles' geometric mean: the paper's coefficients span 14 decades,
-    the scaled ones one. The last systems are kept, as a fit comes back to them.
-    """
+    """Sample G behind a zero-order hold, exactly; a fit asks for the last systems again."""
     whole, part = divmod(model.delay / sample_period, 1.0)
     a, late, c = _discrete(model, sample_period)
     if part == 0.0:
@@ -192,11 +184,7 @@ class Vibration:
 
     @cached_property
     def inverse(self) -> OptimalInverse:
-        """The optimal inverse by its weight.
-
-        Raises InputError where its response does not die out, or where the preview given cuts off
-        what the inverse needs of the targets ahead.
-        """
+        """The optimal inverse; InputError where it does not die out, or for too short a preview."""
         kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
         return OptimalInverse(kernel, self._preview(kernel, self._given))
 

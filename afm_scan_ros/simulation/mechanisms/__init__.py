@@ -15,11 +15,7 @@ PLUGINS = "afm_scan_ros.mechanisms"
 
 
 def mechanism_type(kind: str) -> type[Mechanism] | None:
-    """Return the mechanism of this kind, or None where no installed package defines it.
-
-    The modules of the entry-point group ``PLUGINS`` are imported only for a kind that is not
-    known without them.
-    """
+    """Return the mechanism of a kind, of this package or of a plugin; None where there is none."""
     if kind not in Mechanism.KINDS:
         for point in entry_points(group=PLUGINS):
             point.load()

@@ -18,11 +18,7 @@ from afm_scan_ros.simulation.mechanisms.base import Insert, Place
 
 @compiled
 def follow(state: float, wanted: Array, steps: float) -> tuple[float, Array]:
-    """Follow an input through one time constant, exactly where the input is held.
-
-    Returns the state at the end and its mean in each step, shape (n,). ``steps`` is the length of a
-    step in time constants.
-    """
+    """Follow a held input through one time constant: the state at the end, and the means (n,)."""
     done = -np.expm1(-steps)
     mean = np.empty_like(wanted)
     for k in range(wanted.size):

@@ -113,10 +113,7 @@ class DuhemSlopes:
         return float(self.heights(np.array([u]))[0])
 
     def with_share(self, share: float) -> "DuhemSlopes":
-        """Return the operator whose outputs lie ``share`` times as far from the centre curve.
-
-        Raises InputError where that has no inverse.
-        """
+        """Return the operator ``share`` times as far from its centre, or raise InputError."""
         if share == 0.0:
             flat = np.repeat(self.centre[:, np.newaxis], self.rising.shape[1], axis=1)
             return evolve(self, rising=flat, falling=flat, rest=self.height(0.0))

@@ -145,12 +145,10 @@ def _paged(stack: Array) -> tuple[Array, ...]:
 
 
 def depolarising(lower: float, upper: float, bias: float | None = None) -> Array:
-    """Inputs at the extrema of an oscillation that decays from both limits to zero.
+    """Inputs at the extrema of an oscillation that decays from both limits to zero, or the nearer.
 
-    Where zero lies beyond a limit, it decays to that limit. With a ``bias`` (V), that of an
-    EverettSurface, each swing is shorter than the last by as much: the corners of the staircase
-    that they leave in the Preisach plane lie to either side of one line, alpha = -beta but for the
-    bias. Without one, each pair of swings is shorter than the last.
+    With the ``bias`` (V) of an EverettSurface, each swing is shorter than the last by as much.
+    Without one, each pair of swings is shorter than the last.
     """
     if bias is None:
         decay = 1.0 - np.arange(DEPOLARISING_CYCLES + 1) / DEPOLARISING_CYCLES
