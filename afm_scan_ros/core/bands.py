@@ -15,7 +15,7 @@ from afm_scan_ros.core.types import Array
 
 
 def bounds(edges: ArrayLike, count: int, sample_period: float) -> tuple[int, ...]:
-    """First coefficient of each band between edges (Hz), and the end; an edge is the upper one's."""
+    """First coefficient of each band between edges (Hz), and the end; an edge is in the upper."""
     inner, duration = np.asarray(edges, dtype=np.float64)[1:-1], 2.0 * count * sample_period
     first = np.ceil(inner * duration * (1.0 - 1e-12))
     return (0, *(int(k) for k in np.minimum(first, count)), count)

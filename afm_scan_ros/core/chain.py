@@ -30,10 +30,7 @@ from afm_scan_ros.core.model import (
 
 @frozen
 class Stage:
-    """Consecutive elements of a chain; two stages are equal where their elements are.
-
-    ``coupling`` is what the other axis adds before them.
-    """
+    """Consecutive elements of a chain, after the ``coupling`` that the other axis adds."""
 
     elements: tuple[ChainElement[AnyEffect], ...]
     coupling: tuple[Element[SampledCoupling], ...] = ()
@@ -53,10 +50,7 @@ RATE_INDEPENDENT: Element[AnyEffect] = Element(rate_independent)
 
 @frozen(eq=False)
 class Chain:
-    """The elements of one axis: the model's, and those that were put in beside them.
-
-    ``hysteresis`` lacks the first of its parameters, the operator of the model.
-    """
+    """Elements of one axis; ``hysteresis`` lacks its first parameter, the operator of the model."""
 
     model: AxisModel
     drive: tuple[ChainElement[AnyEffect], ...] = ()

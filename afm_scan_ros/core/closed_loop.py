@@ -81,9 +81,8 @@ class ScannerSession(Protocol):
 class Round:
     """What the diagnosis found, and how the scans with the extended model compare.
 
-    ``model`` made the scans ``before``. ``experiments`` were recorded in this round; each later
-    round diagnoses them again. ``after`` and ``comparisons`` are empty where nothing new was found.
-    They are also empty where the extended inverse could not make a scan; ``refusal`` is the reason.
+    ``model`` made the scans ``before``; ``experiments`` were recorded in this round. ``after`` and
+    ``comparisons`` are empty where nothing new was found, or no scan could be made: ``refusal``.
     """
 
     model: ScannerModel

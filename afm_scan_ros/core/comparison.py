@@ -79,7 +79,6 @@ class Residual:
     """Rms (m) of measured minus predicted displacement, mean removed, of a scan that no fit saw.
 
     ``before`` is of the model, ``after`` of its extension, and ``floor`` is the detection limit.
-    Only parameters that differ in every record, such as a disturbance's phase, are fitted to it.
     """
 
     floor: float = field(metadata=METRES)
@@ -89,10 +88,7 @@ class Residual:
 
 @frozen(eq=False)
 class ScanComparison:
-    """Tracking errors before and after, and the residuals of both models on the scan after.
-
-    The true errors are None where no noise-free displacement is known.
-    """
+    """Tracking errors, the true ones where known, and both models' residuals on the scan after."""
 
     measured_before: Tracking
     measured_after: Tracking

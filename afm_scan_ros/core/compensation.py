@@ -32,10 +32,7 @@ NOTHING: Array = np.empty(0)
 
 @frozen(eq=False)
 class Progress:
-    """State of the compensation: next drive sample, states of the inverses, last drives (V).
-
-    ``ahead`` holds samples that are computed for one axis but not yet for the other.
-    """
+    """States of the inverses, last drives (V), and samples that are ``ahead`` of the other axis."""
 
     next_sample: int
     output: Sequence[Any]
@@ -51,8 +48,7 @@ class Compensation:
     """Desired displacement (m) in, drive (V) out, some samples later; the state is passed in.
 
     ``invert`` and ``finish`` raise ScanError naming sample, axis and value where the drive would
-    leave the model's identified range or the amplifier's limits, and where an axis that the model
-    lacks is to move. The drive of such an axis is 0 V.
+    leave the identified range or the limits, and where an axis that the model lacks is to move.
     """
 
     def __init__(

@@ -49,10 +49,7 @@ def _numba() -> ModuleType:
 
 
 class Compiled(Generic[P, R]):
-    """A loop that becomes machine code when it is first called.
-
-    Importing numba takes longer than many a command does, most of which call no loop.
-    """
+    """A loop that becomes machine code when it is first called, as importing numba takes long."""
 
     def __init__(
         self,

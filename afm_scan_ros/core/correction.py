@@ -18,8 +18,7 @@ Stop: TypeAlias = int | None
 class Correction:
     """Change of the reference of one scan, m: ``x`` and ``y`` of shape (total samples,).
 
-    It belongs to ``spec``. The scan's error is still measured against the desired displacement.
-    Raises InputError for another number of samples, and for what is not finite.
+    The scan's error is still measured against the desired displacement.
     """
 
     spec: ScanSpec

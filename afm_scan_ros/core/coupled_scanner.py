@@ -60,9 +60,8 @@ def valued(names: Iterable[str], actuators: Actuators) -> tuple[FeedbackEffect, 
 
 @frozen
 class LevelError:
-    """Error of a simulation of records that the fit did not see, at one level of the drive.
+    """Rms error (m) on records that the fit did not see, at one rms of the drive (V), all channels.
 
-    ``drive_rms`` (V) and ``displacement_rms`` (m) are over all channels, as is ``error_rms`` (m).
     ``by_band`` is the error over the displacement in parts of equal width of the model's band.
     """
 

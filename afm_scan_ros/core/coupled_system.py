@@ -32,10 +32,7 @@ System = tuple[Array, Array, Array, float, float]
 
 @frozen(eq=False)
 class SampledCoupling(SampledSystem):
-    """What the other axis o (m) adds, in m: a linear system of o, of share d, and an arc.
-
-    The arc has a ``curvature`` (1/m).
-    """
+    """What the other axis adds, in m: a linear system of it, and an arc of ``curvature`` (1/m)."""
 
     curvature: float = 0.0
 
@@ -72,11 +69,7 @@ CoupledState = tuple[int, Array, Array]
 
 
 class CoupledSystem:
-    """Both axes, each of which adds to the other.
-
-    Raises InputError where the inverse is unstable at rest: where 1 - Gx Gy of both couplings'
-    transfer functions has a zero on or outside the unit circle.
-    """
+    """Both axes, each of which adds to the other; InputError where the inverse is unstable."""
 
     def __init__(self, to_x: SampledCoupling, to_y: SampledCoupling, sample_period: float) -> None:
         self._to_x, self._to_y = to_x, to_y

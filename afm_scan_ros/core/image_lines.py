@@ -88,10 +88,7 @@ class ImageLine:
 
 @define
 class LineImager:
-    """Gathers values along the lines block by block, and gives up each line once it is whole.
-
-    Keeps no more than one line.
-    """
+    """Gathers values along the lines block by block, and gives up each line once it is whole."""
 
     spec: ScanSpec
     frame: Frame
@@ -128,10 +125,7 @@ class Imaged(Protocol):
 
 
 class ImageLines:
-    """Reads a sample's height at the achieved position and places it at the desired one.
-
-    The tip touches the sample on the lines alone.
-    """
+    """Reads heights on the lines at the achieved position, and places them at the desired."""
 
     def __init__(self, spec: ScanSpec, frame: Frame, sample: Imaged) -> None:
         self._sample = sample

@@ -27,10 +27,7 @@ METRES = {"unit": "m"}
 
 @frozen
 class Figure:
-    """An error over a set of samples: rms and largest, in m and as a share of the range.
-
-    The range is that of the axis in the specification, however much of the scan is there.
-    """
+    """An error over a set of samples: rms and largest, in m and as a share of the planned range."""
 
     rms: float = field(metadata=METRES)
     largest: float = field(metadata=METRES)
@@ -177,10 +174,7 @@ class LineMeter:
 
 @define
 class TrackingMeter:
-    """Compares the achieved with the desired displacement; ``tracking`` gives the figures so far.
-
-    ``displacement`` names what is compared: ``measured`` or ``true``.
-    """
+    """Compares the achieved with the desired displacement; ``tracking`` has the figures so far."""
 
     spec: ScanSpec
     displacement: str = "measured"

@@ -91,9 +91,7 @@ def closed(name: str, interval: Range, unit: str) -> ParameterInterval:
 class EffectStatus:
     """How one effect is known, and over which drive (V), frequencies (Hz) and hold times (s).
 
-    A range that is None is not stated. ``identifiable_from`` is the kind of record that would
-    identify an effect that is unknown. Raises InputError for a range whose ends are exchanged, and
-    for an unknown effect without such a record.
+    ``identifiable_from`` is the kind of record that would identify an effect that is unknown.
     """
 
     status: Status = field(default=Status.IDENTIFIED, converter=Status)
@@ -148,13 +146,11 @@ those around it.
 
 @frozen
 class ModelDiscrepancy:
-    """Rms in m of measured minus predicted displacement in each band, on held-out data.
+    """Rms (m) of measured minus predicted displacement in each band, on held-out data.
 
-    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
-    (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
-    the relative error, by which other drives may be judged. ``record`` describes the drive.
-    Of motion that was ``fitted`` they are the error of similar motion, and no more.
-    Raises InputError where they do not pair or are no rms.
+    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` is free of the sensor's ``noise``. Over
+    the ``displacement`` in each band it is the relative error, by which other drives may be judged.
+    Of motion that was ``fitted`` it is the error of similar motion. ``record`` is the drive.
     """
 
     record: str
@@ -234,10 +230,7 @@ class HysteresisModel:
 
 @frozen
 class Added:
-    """An effect of the catalogue that was found on an axis, with the values of its parameters.
-
-    ``name`` and ``kind`` are the catalogue's; ``values``, in SI units, are in its order.
-    """
+    """An effect of the catalogue on an axis, with its parameters' values (SI) in their order."""
 
     name: str
     kind: str
@@ -246,10 +239,7 @@ class Added:
 
 @frozen
 class AxisModel:
-    """One axis: drive u (V) → hysteresis → F (V) → vibration → creep → displacement (m).
-
-    ``added`` are effects beyond the paper's, in the order in which they were found.
-    """
+    """One axis: drive u (V) → hysteresis → F (V) → vibration → creep → what was ``added`` → m."""
 
     hysteresis: HysteresisModel
     vibration: VibrationModel
@@ -295,10 +285,7 @@ class AxisModel:
 
 @frozen
 class ScannerModel:
-    """One axis or both, independent of each other but for what was added to either.
-
-    Raises InputError where there is none.
-    """
+    """One axis or both, independent of each other but for what was added to either."""
 
     x: AxisModel | None = None
     y: AxisModel | None = None

@@ -42,7 +42,7 @@ SHARE = ExtensionSettings().share
 
 
 def extended(model: ScannerModel, drive: Trace, share: float = SHARE) -> ScannerModel:
-    """Return the model with wider ranges for axes whose drive (V) leaves them, by a share at most."""
+    """Return the model, wider by a share for axes whose drive (V) leaves the identified range."""
     axes = {n: extended_axis(model.axis(n), getattr(drive, n), share) for n in model.axes}
     return evolve(model, **axes)
 

@@ -23,10 +23,7 @@ LATENCY = 0.04
 
 
 class OnlineCorrection(ABC):
-    """Corrects the reference of a scan, while it runs, by what was achieved of it so far.
-
-    What it yields depends on no timing. ``remark`` says in words what it can do in this scan.
-    """
+    """Corrects the reference of a scan by what was achieved; ``remark`` says what it can do."""
 
     remark = ""
 
@@ -77,10 +74,9 @@ class InversionSettings:
 class ScanInversion:
     """Takes the blocks of one scan, desired and achieved displacement (m); yields the drive (V).
 
-    The drive depends on how the desired displacement is cut into blocks by no more than rounding,
-    and on no timing. ``learned`` is what changes the scan's reference, if anything does. ``driven``
-    is the first sample whose drive is still to come. Raises InputError for a scan that cannot be
-    corrected as the ``settings`` ask.
+    The drive depends on no timing. ``learned`` changes the scan's reference, if anything does.
+    ``driven`` is the first sample whose drive is still to come. Raises InputError for a scan that
+    cannot be corrected as the ``settings`` ask.
     """
 
     def __init__(

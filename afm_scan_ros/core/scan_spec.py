@@ -72,11 +72,7 @@ def _allowed(attribute: "Attribute[Any]") -> str:
 
 @frozen
 class ScanSpec:
-    """A scan, in SI units: m, Hz, s.
-
-    Raises InputError where a parameter is out of range or of another type, and where parameters
-    contradict.
-    """
+    """A scan, in SI units: m, Hz, s; InputError for parameters out of range, or that contradict."""
 
     pattern: str = parameter("raster", "Path of the scan", in_(PATTERNS))
     range_x: float = parameter(

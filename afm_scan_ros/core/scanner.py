@@ -45,10 +45,7 @@ InverseState = Any
 
 
 class Coupling:
-    """Coupling of both axes; the state is that of what is added to each.
-
-    ``axes`` are those to which the other adds something that counts.
-    """
+    """Coupling of both axes, or of those given; the state is that of what is added to each."""
 
     def __init__(
         self, model: ScannerModel, sample_period: float, axes: Collection[str] = AXES
@@ -106,10 +103,7 @@ Predicted = tuple[dict[str, Any], States, dict[str, Any]]
 
 
 class Prediction:
-    """Drive (V) in, displacement (m) out, block by block; the state is passed in.
-
-    An axis that the model lacks rests at zero.
-    """
+    """Drive (V) in, displacement (m) out, by blocks; an axis that the model lacks rests at zero."""
 
     def __init__(self, model: ScannerModel, sample_period: float) -> None:
         chains = {name: chain_of(model.axis(name)) for name in model.axes}

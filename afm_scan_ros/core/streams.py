@@ -79,10 +79,7 @@ class Aligner:
 
 
 class WholeLines:
-    """Gathers lines of ``size`` samples in so many ``rows``; those outside ``lines`` are dropped.
-
-    Keeps one line, however long the scan is.
-    """
+    """Gathers lines of ``size`` samples in so many ``rows``, one at a time; drops all others."""
 
     def __init__(self, lines: range, size: int, rows: int) -> None:
         self._lines = lines
@@ -122,10 +119,7 @@ class LineError:
 
 
 class LineErrors:
-    """Aligns desired with achieved displacement, and yields each complete line's error.
-
-    Holds one line and the blocks in flight; samples outside the lines are dropped.
-    """
+    """Aligns desired with achieved displacement, and yields each complete line's error."""
 
     def __init__(self, lines: range, samples_per_line: int) -> None:
         self._aligner = Aligner((DESIRED, ACHIEVED))
@@ -180,10 +174,9 @@ class MonitorSample:
 
 
 class MonitorSamples:
-    """Aligns three streams of blocks, and yields each sample that is a multiple of a step.
+    """Aligns three streams of blocks, and yields samples, ``MONITOR_RATE`` a second at most.
 
-    The step is the smallest with which they are ``MONITOR_RATE`` a second of the scan at most;
-    ``sample_period`` in s. No sample waits for the drive: a recording may hold none.
+    No sample waits for the drive: a recording may hold none.
     """
 
     def __init__(self, sample_period: float) -> None:

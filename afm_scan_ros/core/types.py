@@ -17,10 +17,7 @@ ProgressCallback: TypeAlias = Callable[[str], None]
 
 
 class Step(str):
-    """What a long computation is doing, when ``done`` of its ``total`` equal parts are over.
-
-    Where ``more`` parts may follow, which are not planned yet, the time left is a lower bound.
-    """
+    """What is done when ``done`` of a ``total`` of parts are over; ``more`` may be planned."""
 
     __slots__ = ("done", "more", "total")
     done: int
@@ -40,10 +37,7 @@ class Step(str):
 
 @define
 class Tally:
-    """Counts the parts of a search, of which more are planned as it goes on.
-
-    Parts that are ``named`` apart, as those of each axis, are counted together.
-    """
+    """Counts the parts of a search while more are planned; those ``named`` apart count together."""
 
     _progress: ProgressCallback
     _name: str = ""
@@ -92,10 +86,9 @@ def by_value(array: Array | None) -> tuple[tuple[int, ...], bytes] | None:
 
 @frozen(eq=False)
 class Trace:
-    """A run of consecutive x-y samples, in m (displacement) or V (drive).
+    """A run of consecutive x-y samples, in m (displacement) or V (drive), (n,) each.
 
-    ``x`` and ``y`` have the same shape (n,); ``x[0]`` is sample ``first_sample`` of its scan and
-    lies at ``first_sample * sample_period`` seconds after the scan's start.
+    ``x[0]`` is sample ``first_sample`` of its scan, from which time counts too.
     """
 
     first_sample: int

@@ -35,10 +35,7 @@ class HysteresisSpec:
 
 @frozen
 class RationalSpec:
-    """A stable, proper transfer function: polynomials in s (rad/s), highest power first.
-
-    Raises InputError where it is not stable, not proper, or has a pole twice.
-    """
+    """A stable, proper transfer function of simple poles; polynomials in s, highest power first."""
 
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]

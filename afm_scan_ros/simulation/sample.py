@@ -37,10 +37,9 @@ class Grating:
 
 @frozen(eq=False)
 class HeightMap:
-    """Heights, m, on a regular grid centred on the origin: row 0 at the lowest y, column 0 at x.
+    """Heights (m), (rows, columns), centred on the origin: row 0 at the lowest y, column 0 at x.
 
-    ``heights`` has shape (rows, columns), at least 2 by 2; ``width`` is the distance of the first
-    column from the last, m, and the rows lie as far apart as the columns.
+    ``width`` is the distance of the first column from the last, m; rows lie as far apart.
     """
 
     heights: Array

@@ -46,10 +46,7 @@ class SensorSpec:
 
 @frozen
 class PlantSpec:
-    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m.
-
-    ``mechanisms`` are what the scanner has come to have besides, in the order in which they act.
-    """
+    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m."""
 
     amplifier: AmplifierSpec
     sensor: SensorSpec
@@ -86,10 +83,7 @@ class SimulatedElement(Protocol):
 
 @frozen(eq=False)
 class PerAxis:
-    """What each axis does by itself: its hysteresis, or its structure.
-
-    ``starts`` give the state at rest of each axis; ``moves`` take it, a signal and the step (s).
-    """
+    """What each axis does by itself: its ``starts`` at rest, and its ``moves`` by a step (s)."""
 
     starts: tuple[Callable[[], Array | ComplexArray], ...]
     moves: tuple[Callable[[Any, Array, float], tuple[Any, Array]], ...]

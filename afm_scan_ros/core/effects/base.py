@@ -138,8 +138,7 @@ class Recursion(CausalInverse):
 class StatelessEffect(CausalInverse):
     """Base of effects whose output depends on the present input alone; the state is None.
 
-    They do not depend on the sample period, so each is its own element of a chain. Subclasses are
-    frozen attrs classes, which compare by value.
+    Each is its own element of a chain: a frozen class, which compares by value.
     """
 
     @abstractmethod
@@ -209,9 +208,8 @@ class ChainElement(Protocol[E_co]):
 class Element(Generic[E]):
     """An effect and its parameters, which may be numbers, strings, tuples and frozen records.
 
-    ``make`` is the effect's class, or a function of a module: it takes the parameters and, as its
-    last argument, the sample period (s). Both are compared, so a lambda or a closure would never
-    equal another one.
+    ``make`` is a class or a function of a module, of the parameters and the sample period (s).
+    Both are compared, so a lambda or a closure would never equal another one.
     """
 
     make: Callable[..., E]

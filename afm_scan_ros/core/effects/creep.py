@@ -20,11 +20,7 @@ from afm_scan_ros.core.types import Array, floats
 
 @frozen
 class CreepModel:
-    """Gains (dimensionless) and time constants (s) of the sections, one each.
-
-    Raises InputError where they do not pair, are not finite, or where a time constant is not
-    positive.
-    """
+    """Gains (1) and time constants (s > 0) of the sections; InputError unless these pair."""
 
     gains: tuple[float, ...] = field(converter=floats)
     time_constants: tuple[float, ...] = field(converter=floats)
@@ -60,10 +56,7 @@ def _run(
 
 
 class Creep(Recursion):
-    """Creep of one axis (m); the state is the output of each section, shape (sections,).
-
-    The inverse solves each step of the discrete system for its input, so it is exact.
-    """
+    """Creep of one axis (m), with its exact inverse; the state is the output of each section."""
 
     def __init__(self, model: CreepModel, sample_period: float) -> None:
         self._gains = np.array(model.gains)

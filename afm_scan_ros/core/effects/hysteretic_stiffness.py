@@ -94,9 +94,8 @@ def _run(
 class HystereticStiffness(Recursion):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
-    ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
-    it runs the same loop along the target and subtracts u. It is exact except for the predicted end
-    of each period, as above.
+    ``material`` is (thresholds (m), kᵢ, b). The inverse knows x, so it runs the same loop along the
+    target and subtracts u: exact but for the predicted end of each period.
     """
 
     def __init__(

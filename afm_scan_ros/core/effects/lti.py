@@ -58,10 +58,7 @@ def _filter(
 
 @frozen(eq=False)
 class SampledSystem:
-    """The system above, with shapes (n, n), (n,), (n,) and a ``delay`` in samples.
-
-    The state is x, then the inputs that are still delayed: shape (n + delay,).
-    """
+    """The system above, with a ``delay`` in samples; the state is x, then the inputs delayed."""
 
     a: Array = field(converter=np.ascontiguousarray)
     b: Array = field(converter=np.ascontiguousarray)

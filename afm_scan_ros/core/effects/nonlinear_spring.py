@@ -71,8 +71,7 @@ def _run(
 class NonlinearSpring(Recursion):
     """What the spring of a resonance has beyond a straight line, in feedback on the displacement.
 
-    ``square`` is in 1/m, ``cube`` in 1/m². The inverse knows x, so it runs the same loop along the
-    target and subtracts u.
+    The inverse knows x, so it runs the same loop along the target and subtracts u.
     """
 
     def __init__(

@@ -75,8 +75,7 @@ def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
 class Disturbance(CausalInverse):
     """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
-    ``harmonics`` are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
-    nobody knows, so there is nothing to subtract.
+    ``harmonics`` are aₖ - j bₖ, from the first on. Their phase in the next scan is unknown.
     """
 
     harmonics: tuple[complex, ...]

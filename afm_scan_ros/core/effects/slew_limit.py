@@ -59,11 +59,9 @@ def _apply(end: float, law: tuple[float, float, float], block: Array, result: Ar
 class SlewLimit(CausalInverse):
     """Limits of rising and falling (V/s), of which each volt takes and gives a ``rate`` (1/s).
 
-    The state is the voltage at the last hold's end (V), by which the next hold is limited.
-
-    Where the slope suffices, v still comes late by the time it takes to each update's step. The
-    inverse adds that, exact on ramps. What is too steep no inverse can reach: it raises
-    SampleError. Its state is the last target (V).
+    The state is the voltage at the last hold's end (V). Where the slope suffices, v still comes
+    late by the time it takes to each update's step. The inverse adds that, exact on ramps, and
+    raises SampleError for what is too steep. Its state is the last target (V).
     """
 
     def __init__(self, rising: float, falling: float, rate: float, sample_period: float) -> None:

@@ -64,10 +64,7 @@ def _run(
 
 
 class NortonCreep(Recursion):
-    """Creep by a power of its stress; the state is z (m).
-
-    The inverse solves each step of the discrete system for its input, so it is exact.
-    """
+    """Creep by a power of its stress, with its exact inverse; the state is z (m)."""
 
     def __init__(
         self, gain: float, time_constant: float, power: float, unit: float, period: float

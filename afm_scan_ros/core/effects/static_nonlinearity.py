@@ -64,11 +64,7 @@ def _bend(coefficients: Array, reach: float, block: Array, bent: Array, slope: A
 
 @frozen
 class StaticNonlinearity(StatelessEffect):
-    """A rising polynomial, with its inverse by Newton's method.
-
-    ``coefficients`` are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
-    everywhere within the ``reach``, m or V.
-    """
+    """A polynomial from x₀⁰ on; InputError unless it rises within its ``reach`` (m or V)."""
 
     coefficients: tuple[float, ...] = field(converter=floats)
     reach: float = REACH

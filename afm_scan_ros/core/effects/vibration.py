@@ -164,10 +164,8 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
 class Vibration:
     """Vibration of one axis; the state is that of the sampled system, then the inputs delayed.
 
-    The inverse is the optimal one, designed when first asked for; what it declares is the
-    modified trajectory of the paper's Eq. 22, exact at rest. Its ``preview`` (s) is as long as it
-    needs where None. ``before`` is the vibration that the weight was chosen for, where another one
-    multiplies it.
+    The inverse is the optimal one, exact at rest, its ``preview`` (s) as long as it needs if None.
+    ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
     """
 
     def __init__(

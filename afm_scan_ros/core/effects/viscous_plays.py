@@ -248,8 +248,7 @@ def _invert(
 class ViscousPlays(CausalInverse):
     """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
 
-    Where the ``activation`` (V) is infinite the film is viscous alone. The inverse solves each
-    sample's one equation between its bounds. Samples beyond the surface raise BeyondRangeError.
+    Where the ``activation`` (V) is infinite the film is viscous alone.
     """
 
     def __init__(

@@ -30,10 +30,7 @@ def follow(state: float, wanted: Array, steps: float) -> tuple[float, Array]:
 
 @frozen(kw_only=True)
 class Charging(Insert):
-    """A capacitance that is charged through a resistance.
-
-    ``resistance`` in Ohm, ``capacitance`` in F. State: voltage of the capacitance, V.
-    """
+    """A capacitance that is charged through a resistance; state: its voltage, V."""
 
     PLACE: ClassVar[Place] = "drive"
 

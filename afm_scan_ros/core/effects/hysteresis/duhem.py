@@ -129,9 +129,8 @@ class DuhemSlopes:
 class Duhem(CausalInverse):
     """Hysteresis of one axis, with its exact inverse.
 
-    The state of either, shape (2,), is the last input (V) and the distance (V) of the output from
-    the centre curve. Inputs beyond the identified range, and outputs that need such inputs, raise
-    BeyondRangeError.
+    The state of either, shape (2,), is the last input (V) and the output's distance (V) from the
+    centre curve. What is or needs an input beyond the identified range raises BeyondRangeError.
     """
 
     def __init__(self, slopes: DuhemSlopes) -> None:

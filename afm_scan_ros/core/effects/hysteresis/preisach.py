@@ -120,11 +120,10 @@ AT_ONCE = 2**15
 
 @frozen(eq=False)
 class Memory:
-    """What the material remembers: the extrema not yet wiped out, and the present.
+    """What the material remembers: the extrema not yet wiped out, and the present pair, ``now``.
 
-    ``pages``, of shape (2, …) each, the oldest first, hold inputs and outputs (V); the first is a
-    minimum (the negative saturation) and they alternate. Every page but the last holds ``PAGE``
-    of them. ``now``, shape (2,), is the last sample's pair.
+    ``pages`` (2, …), the oldest first, hold inputs and outputs (V), a minimum first, the negative
+    saturation. Every page but the last holds ``PAGE`` of them.
     """
 
     pages: tuple[Array, ...]
@@ -217,10 +216,8 @@ class Preisach(CausalInverse):
 class DirectInverse(CausalInverse):
     """Hysteresis of one axis whose inverse is a Preisach model; the state is that one's Memory.
 
-    This is the paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17). It is identified
-    from output to input, with the surface U(alpha, beta) over the effective input F.
-    ``surface`` is over F (V); its output is u (V), and its bias is of u. Samples beyond it raise
-    BeyondRangeError.
+    The paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17), identified from output to
+    input: ``surface`` is over F (V), its output is u (V). Samples beyond raise BeyondRangeError.
     """
 
     def __init__(self, surface: EverettSurface) -> None:
