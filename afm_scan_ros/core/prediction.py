@@ -23,7 +23,7 @@ from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel,
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread, Variant
-from afm_scan_ros.core.types import Array, Trace, setting
+from afm_scan_ros.core.types import AXES, Array, Trace, setting
 
 
 @frozen
@@ -139,31 +139,17 @@ def standard_deviation(
 
     Without a ``Spread`` it is the rms error of the motion. InputError where an axis has none.
     """
-    given = drive.sample_period, share, intersample
-    found = {
-        name: _of_axis(model, name, drive.axis(name), moved.axis(name), *given)
-        for name in model.axes
-    }
-    still = np.zeros_like(moved.x)
-    return evolve(moved, x=found.get("x", still), y=found.get("y", still))
-
-
-def _of_axis(
-    model: ScannerModel,
-    name: str,
-    drive: Array,
-    moved: Array,
-    sample_period: float,
-    share: float,
-    intersample: str,
-) -> Array:
-    axis = model.axis(name)
-    beyond = unknown_beyond(axis, drive, share)
-    if axis.spread is None:
-        return np.asarray(np.hypot(_of_records(axis, name, moved, sample_period), beyond))
-    known = np.sum(apart(axis, axis.spread, drive, sample_period, share, intersample) ** 2, axis=0)
-    left = discrepancy(axis.spread, moved, sample_period)
-    return np.asarray(np.sqrt(known + left**2 + beyond**2))
+    found, period = {name: np.zeros_like(moved.x) for name in AXES}, drive.sample_period
+    for name in model.axes:
+        axis, volts, motion = model.axis(name), drive.axis(name), moved.axis(name)
+        beyond = unknown_beyond(axis, volts, share)
+        if axis.spread is None:
+            found[name] = np.hypot(_of_records(axis, name, motion, period), beyond)
+            continue
+        known = np.sum(apart(axis, axis.spread, volts, period, share, intersample) ** 2, axis=0)
+        left = discrepancy(axis.spread, motion, period)
+        found[name] = np.sqrt(known + left**2 + beyond**2)
+    return evolve(moved, x=found["x"], y=found["y"])
 
 
 def apart(
@@ -178,11 +164,15 @@ def apart(
 
     Effects that were added to the axis are left out. About the mean, where the rest is not known.
     """
-    given = drive, sample_period, share, intersample
-    middle = _moved(axis, spread.centre, *given)
-    each = np.array(
-        [(_moved(axis, one, *given) - middle) / one.deviations for one in spread.directions]
-    ).reshape(-1, len(drive))
+    volts = held_voltages(drive, intersample)
+
+    def moved(variant: Variant) -> Array:
+        wider = extended_axis(varied(axis, variant), volts, share)
+        return moved_by(partial(forward, wider), drive, sample_period, intersample)
+
+    middle = moved(spread.centre)
+    each = np.array([(moved(one) - middle) / one.deviations for one in spread.directions])
+    each = each.reshape(-1, len(drive))
     return each if spread.rest_known else each - each.mean(axis=1, keepdims=True)
 
 
@@ -201,18 +191,6 @@ def varied(axis: AxisModel, variant: Variant) -> AxisModel:
         sensor=variant.sensor,
         added=(),
     )
-
-
-def _moved(
-    axis: AxisModel,
-    variant: Variant,
-    drive: Array,
-    sample_period: float,
-    share: float,
-    intersample: str,
-) -> Array:
-    wider = extended_axis(varied(axis, variant), held_voltages(drive, intersample), share)
-    return moved_by(partial(forward, wider), drive, sample_period, intersample)
 
 
 def _of_records(axis: AxisModel, name: str, moved: Array, sample_period: float) -> float:

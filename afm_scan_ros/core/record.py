@@ -7,14 +7,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.core.arguments import (
-    SPEC,
-    axes_of,
-    of_type,
-    period_of,
-    refuse_other_count,
-    samples,
-)
+from afm_scan_ros.core import arguments
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.intersample import HELD, upsampling
@@ -28,11 +21,11 @@ STARTS = ("unknown", "depolarised")
 
 
 def _drive(given: ArrayLike) -> Array:
-    return samples("drive", given)
+    return arguments.samples("drive", given)
 
 
 def _displacement(given: ArrayLike) -> Array:
-    return samples("displacement", given)
+    return arguments.samples("displacement", given)
 
 
 def _shape(values: Array) -> str:
@@ -100,8 +93,8 @@ class Record:
 
     drive: Array = field(converter=_drive, repr=_shape, eq=by_value)
     displacement: Array = field(converter=_displacement, repr=_shape, eq=by_value)
-    sample_period: float = field(converter=period_of)
-    axes: tuple[str, ...] = field(default=("x",), converter=axes_of)
+    sample_period: float = field(converter=arguments.period_of)
+    axes: tuple[str, ...] = field(default=("x",), converter=arguments.axes_of)
     kind: str | None = None
     start: str = "unknown"
     intersample: str = field(default=HELD, kw_only=True)
@@ -111,7 +104,7 @@ class Record:
     info: ScanInfo | None = field(default=None, kw_only=True, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        refuse_other_count("displacement", self.displacement, self.axes)
+        arguments.refuse_other_count("displacement", self.displacement, self.axes)
         if len(self.drive) != len(self.displacement):
             raise InputError(
                 f"drive has {len(self.drive)} samples and displacement {len(self.displacement)}:"
@@ -123,7 +116,7 @@ class Record:
             raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
         upsampling(self.intersample)
         if self.scan is not None:
-            of_type(ScanSpec, "scan", self.scan, SPEC)
+            arguments.of_type(ScanSpec, "scan", self.scan, arguments.SPEC)
 
     @classmethod
     def of_traces(
@@ -158,7 +151,7 @@ class Record:
             raise InputError(
                 f"{self.name or 'record'}: has no axis {name}: give one of {', '.join(self.axes)}"
             )
-        refuse_other_count("drive", self.drive, self.axes)
+        arguments.refuse_other_count("drive", self.drive, self.axes)
         drive, displacement = self.signals(name)
         return evolve(self, drive=drive, displacement=displacement, axes=(name,))
 
@@ -202,7 +195,7 @@ class Record:
                 f"{self.name or 'record'}: its axes are {', '.join(self.axes)}: name them x and y,"
                 " unless the scanner has coupled axes"
             )
-        refuse_other_count("drive", self.drive, self.axes)
+        arguments.refuse_other_count("drive", self.drive, self.axes)
         drive, displacement = (
             trace_of(values, self.axes, self.sample_period)
             for values in (self.drive, self.displacement)

@@ -153,8 +153,10 @@ class Phases:
 
 def phases(spec: ScanSpec) -> Phases:
     """Return where each phase of a scan lies; the very last sample is at rest at zero."""
-    prepared = preparation_samples(spec)
-    approached = prepared + approach_samples(spec)
+    prepared = 0
+    if spec.preparation != "none":
+        prepared = round(spec.preparation_cycles / (spec.preparation_rate * spec.sample_period))
+    approached = prepared + max(1, round(spec.approach / spec.sample_period))
     scanned = approached + spec.lines * spec.samples_per_line
     return Phases(
         preparation=range(prepared),
@@ -169,26 +171,14 @@ def total_samples(spec: ScanSpec) -> int:
     return phases(spec).total
 
 
-def approach_samples(spec: ScanSpec) -> int:
-    """Samples from rest at zero to the first line."""
-    return max(1, round(spec.approach / spec.sample_period))
-
-
 def settle_samples(spec: ScanSpec) -> int:
     """Samples from the last line's end to rest at zero."""
     return max(1, round(spec.settle / spec.sample_period))
 
 
-def preparation_samples(spec: ScanSpec) -> int:
-    """Samples that the preparation takes; 0 without one."""
-    if spec.preparation == "none":
-        return 0
-    return round(spec.preparation_cycles / (spec.preparation_rate * spec.sample_period))
-
-
 def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
     """Displacement in m, the same along both axes, at sample numbers from the scan's start."""
-    cycles = spec.preparation_cycles * (samples / preparation_samples(spec))
+    cycles = spec.preparation_cycles * (samples / len(phases(spec).preparation))
     if spec.preparation == "saturate":
         # from zero to the upper bound and back, once a cycle
         return np.asarray(spec.preparation_upper * 0.5 * (1.0 - np.cos(2.0 * np.pi * cycles)))
@@ -302,7 +292,7 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
     end = spec.lines * spec.samples_per_line
     if samples[0] >= 0 and samples[-1] <= end:
         return 1.0
-    rise = smooth_step(1.0 + samples / approach_samples(spec))
+    rise = smooth_step(1.0 + samples / len(phases(spec).approach))
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))
 
 

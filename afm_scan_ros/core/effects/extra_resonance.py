@@ -37,6 +37,7 @@ from afm_scan_ros.core.effects.residual_features import (
     CandidateMode,
     ResidualFeatures,
     likely_modes,
+    modes_or_usual,
 )
 from afm_scan_ros.core.effects.vibration import OSCILLATES, first_resonance, resonant
 from afm_scan_ros.core.types import Array
@@ -49,7 +50,6 @@ TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200)
 LIKELY = tuple(
     CandidateMode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0)
 )
-SOUGHT = 5
 HEAVY = tuple(CandidateMode(float(frequency), 0.02) for frequency in np.geomspace(300.0, 2000.0, 8))
 MASSES = (0.05, 0.1, 0.2, 0.4)
 SEEN = 3
@@ -140,8 +140,7 @@ def _predicted(features: ResidualFeatures) -> Array:
 
 
 def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
-    found = likely_modes(cause, features.residual, features.sample_period, SOUGHT)
-    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+    for mode in modes_or_usual(cause, features, LIKELY):
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 

@@ -116,6 +116,14 @@ def likely_modes(
     return _apart([mode for gain, mode in ranked if gain > 0.0], most)
 
 
+def modes_or_usual(
+    moved: Array, features: ResidualFeatures, usual: tuple[CandidateMode, ...]
+) -> tuple[CandidateMode, ...]:
+    """As many likely modes as there are usual ones, which stand in for those that none shows."""
+    found = likely_modes(moved, features.residual, features.sample_period, len(usual))
+    return (*found, *usual[: len(usual) - len(found)])
+
+
 def _explained(mode: CandidateMode, through: Spectrum, beyond: Spectrum, spacing: float) -> float:
     """Energy of the residual that the resonance explains beyond a straight line."""
     middle, reach = mode.frequency / spacing, REACH * mode.damping

@@ -14,15 +14,8 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
+from afm_scan_ros.core.effects import optimal_inverse as optimal
 from afm_scan_ros.core.effects.lti import SampledSystem
-from afm_scan_ros.core.effects.optimal_inverse import (
-    Kernel,
-    MultipliedWeight,
-    OptimalInverse,
-    RelativeWeight,
-    Weight,
-    optimal_kernel,
-)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
 
@@ -172,30 +165,31 @@ class Vibration:
         self,
         model: VibrationModel,
         sample_period: float,
-        weight: Weight | RelativeWeight | None = None,
+        weight: optimal.Weight | optimal.RelativeWeight | None = None,
         preview: float | None = None,
         before: VibrationModel | None = None,
     ) -> None:
         self._system = held(model, sample_period)
         self._model, self._sample_period = model, sample_period
-        self._chosen, self._given, self._before = weight or RelativeWeight(), preview, before
+        self._chosen = weight or optimal.RelativeWeight()
+        self._given, self._before = preview, before
 
     @cached_property
-    def inverse(self) -> OptimalInverse:
+    def inverse(self) -> optimal.OptimalInverse:
         """The optimal inverse; InputError where it does not die out, or for too short a preview."""
-        kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
-        return OptimalInverse(kernel, self._preview(kernel, self._given))
+        kernel = optimal.optimal_kernel(self._system.response, self._weight(), self._sample_period)
+        return optimal.OptimalInverse(kernel, self._preview(kernel, self._given))
 
-    def _weight(self) -> Weight:
+    def _weight(self) -> optimal.Weight:
         weight, chosen_for = self._chosen, self._before or self._model
-        if isinstance(weight, RelativeWeight):
+        if isinstance(weight, optimal.RelativeWeight):
             weight = weight.at(chosen_for.natural_frequency)
         if self._before is None:
             return weight
         response, before = self._system.response, held(chosen_for, self._sample_period).response
-        return MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
+        return optimal.MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
 
-    def _preview(self, kernel: Kernel, given: float | None) -> int:
+    def _preview(self, kernel: optimal.Kernel, given: float | None) -> int:
         """Return the preview, samples; refuse one (s) that is too short."""
         if given is None:
             least = round(PERIODS / (self._model.natural_frequency * self._sample_period))
