@@ -178,12 +178,8 @@ class Compensation:
 
     def whole(self, desired: Trace) -> Trace:
         """Return the drive of a whole scan from its first sample."""
-        whole = {name: np.empty(len(desired.x)) for name in AXES}
-        for drive in self._blocks(desired):
-            last = drive.first_sample + len(drive.x)
-            for name in AXES:
-                whole[name][drive.first_sample : last] = drive.axis(name)
-        return Trace(0, self._sample_period, whole["x"], whole["y"])
+        x, y = zip(*((drive.x, drive.y) for drive in self._blocks(desired)), strict=True)
+        return Trace(0, self._sample_period, np.concatenate(x), np.concatenate(y))
 
     def _blocks(self, desired: Trace) -> Iterator[Trace]:
         progress = self.at_rest()

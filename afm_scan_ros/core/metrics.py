@@ -130,8 +130,7 @@ class LineMeter:
 
     spec: ScanSpec
     mismatch: ErrorSum = field(factory=ErrorSum)
-    _jitter_x: ErrorSum = field(factory=ErrorSum)
-    _jitter_y: ErrorSum = field(factory=ErrorSum)
+    _jitter: list[ErrorSum] = field(factory=lambda: [ErrorSum() for _ in AXES])
     _whole: WholeLines = field(init=False)
     _trace: slice = field(init=False)
     _before: Array | None = None
@@ -150,10 +149,7 @@ class LineMeter:
 
     def repeatability(self) -> tuple[float | None, float | None]:
         """Return the rms change (m) from line to line in x and y; None before the third line."""
-        x, y = (
-            total.rms() / sqrt(2.0) if total.count else None
-            for total in (self._jitter_x, self._jitter_y)
-        )
+        x, y = (total.rms() / sqrt(2.0) if total.count else None for total in self._jitter)
         return x, y
 
     def _compare(self, number: int, line: Array) -> None:
@@ -167,8 +163,7 @@ class LineMeter:
         if self._before is not None:
             change = errors - self._before
             change -= change.mean(axis=1, keepdims=True)
-            self._jitter_x = self._jitter_x.plus(change[0])
-            self._jitter_y = self._jitter_y.plus(change[1])
+            self._jitter = [s.plus(row) for s, row in zip(self._jitter, change, strict=True)]
         self._before = errors.copy()
 
 
@@ -203,20 +198,17 @@ class TrackingMeter:
 
     def tracking(self) -> Tracking:
         """Return the figures of all samples so far."""
+        where = phases(self.spec).lines
+        inside = min(max(self._samples, where.start), where.stop) - where.start
         each_x, each_y = self._lines.repeatability()
         return Tracking(
             displacement=self.displacement,
             samples=self._samples,
-            lines=self._whole_lines(),
+            lines=inside // self.spec.samples_per_line,
             x=self._axis("x", each_x),
             y=self._axis("y", each_y),
             mismatch=self._lines.mismatch.figure(self.spec.range_x),
         )
-
-    def _whole_lines(self) -> int:
-        where = phases(self.spec).lines
-        inside = min(max(self._samples, where.start), where.stop) - where.start
-        return inside // self.spec.samples_per_line
 
     def _extend_range(self, axis: str, desired: Trace) -> None:
         where = phases(self.spec).lines

@@ -36,11 +36,6 @@ class CreepModel:
         if min(self.time_constants, default=1.0) <= 0.0:
             raise InputError(f"creep time_constants must be positive: {self.time_constants}")
 
-    @property
-    def static_gain(self) -> float:
-        """Gc(0): what a step has grown to, relative to its first instant, after all creep."""
-        return 1.0 + sum(self.gains)
-
 
 @compiled
 def _run(
