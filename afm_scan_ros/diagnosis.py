@@ -32,7 +32,7 @@ from afm_scan_ros.report.diagnosis_text import (
     result,
     unexplained_text,
 )
-from afm_scan_ros.report.provenance import provenance_of, source_of
+from afm_scan_ros.report.page import provenance_of, source_of
 from afm_scan_ros.report.table import Part
 
 SAME = 1e-6

@@ -31,7 +31,7 @@ from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import AXES, Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml
 from afm_scan_ros.files.paths import path_of
-from afm_scan_ros.report.effect_status_text import unknown_effects
+from afm_scan_ros.report.sentences import unknown_effects
 
 if TYPE_CHECKING:
     from afm_scan_ros.core.coupled_scanner import CoupledScanner

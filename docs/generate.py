@@ -22,8 +22,7 @@ from afm_scan_ros.drivers import ScannerSettings
 from afm_scan_ros.files import model_file, plant_file, share_directory
 from afm_scan_ros.files.records import key_of
 from afm_scan_ros.nodes import NODES as NODE_NAMES
-from afm_scan_ros.nodes.flow import FLOW
-from afm_scan_ros.nodes.parameters import NodeParameter, scan_spec_parameters
+from afm_scan_ros.nodes.parameters import FLOW, NodeParameter, scan_spec_parameters
 from names_of_ros import names_of_ros
 from settings_page import settings_page
 
@@ -214,8 +213,7 @@ def nodes() -> str:
 
 
 def _node(name: str) -> str:
-    found = vars(importlib.import_module(f"afm_scan_ros.nodes.{name}")).values()
-    node = next(value for value in found if getattr(value, "NAME", None) == name)
+    node = importlib.import_module("afm_scan_ros.nodes.run").node_class(name)
     own = [*node.PARAMETERS]
     if name == "trajectory_generator":
         own += scan_spec_parameters()

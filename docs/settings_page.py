@@ -14,7 +14,7 @@ from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.intersample import IntersampleSettings
 from afm_scan_ros.core.prediction import ExtensionSettings
 from afm_scan_ros.drivers.safety import SafetySettings
-from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import ViewSettings
 from afm_scan_ros.report.reduction import DrawingSettings
 
 SETTINGS: tuple[type, ...] = (

@@ -221,7 +221,9 @@ def test_the_page_without_ros_names_the_commands_that_start_no_node() -> None:
 
 
 def texts_of_the_package() -> Iterator[str]:
-    """Every text in the code, the fixed parts of those with values in them apart."""
+    """Every text in the code and every sentence, the fixed parts of those with values apart."""
+    catalogue = (ROOT / "afm_scan_ros/report/templates/sentences.yaml").read_text("utf-8")
+    yield " ".join(catalogue.split())
     for path in (ROOT / "afm_scan_ros").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):

@@ -106,7 +106,6 @@ def _of_stated_size(chunk: Chunk) -> bytes:
 
 
 def _decompressed(chunk: Chunk, most: int) -> bytes:
-    """Return the contents, cut off after so many bytes."""
     match chunk.compression:
         case "":
             return chunk.data

@@ -256,7 +256,6 @@ def _without_info(path: Path) -> str:
 
 
 def _first_info(path: Path, files: Sequence[Path], topics: dict[str, str]) -> ScanInfo:
-    """Return what the first block of samples states of its record."""
     names = {topic: name for name, topic in topics.items()}
     for run in (run for file in files for run in runs(file)):
         if run.topic in names:

@@ -148,7 +148,6 @@ def _from_bag(bag: ScanRecording, kind: str | None, start: str) -> Record:
 
 
 def _shortcomings(bag: ScanRecording, drive: Trace) -> list[str]:
-    """Say what a bag does not hold of its record."""
     found = []
     first, samples = drive.first_sample, len(drive.x)
     if first:

@@ -1,9 +1,9 @@
-"""The message types of bags, and where their fields lie, so that numpy reads many at once.
+"""The message types of bags: where their fields lie, and what those of monitors hold.
 
-The definitions in ``msg/`` list the fields; how long strings and sequences are is taken
-from one message, whose shape the others must have. Alignment: OMG, Common Object Request Broker
-Architecture, 15.3: each number lies at a multiple of its own size, counted after the four bytes
-that name the encoding.
+With the places of the fields numpy reads many messages at once. The definitions in ``msg/`` list
+the fields; how long strings and sequences are is taken from one message, whose shape the others
+must have. Alignment: OMG, Common Object Request Broker Architecture, 15.3: each number lies at a
+multiple of its own size, counted after the four bytes that name the encoding.
 """
 
 from collections.abc import Mapping
@@ -17,6 +17,9 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.core.streams import LineError
+from afm_scan_ros.core.types import Array
 from afm_scan_ros.files import own_types
 
 PACKAGE = "afm_scan_ros/msg"
@@ -138,3 +141,31 @@ class _Cursor:
     def _aligned(self, size: int) -> int:
         self.place += -self.place % size
         return _ENCODING_SIZE + self.place
+
+
+IMAGE = "sensor_msgs/msg/Image"
+WAYS = {"scan_image/trace": "trace", "scan_image/retrace": "retrace"}
+"""Ends of topics of images, and the directions that they show."""
+KINDS = {("32FC1", False): np.dtype("<f4"), ("32FC1", True): np.dtype(">f4")}
+"""Numbers of heights, by the encoding and whether the first byte is the highest."""
+
+
+def way_of(topic: str) -> str | None:
+    """Return the direction that a topic of images shows, in any namespace; None of another."""
+    return next((way for end, way in WAYS.items() if f"/{topic}".endswith(f"/{end}")), None)
+
+
+def heights(message: Message) -> Array:
+    """Return the heights (m) of an image, (lines, pixels); raises ValueError for another image."""
+    kind = KINDS.get((message.encoding, bool(message.is_bigendian)))
+    if kind is None:
+        raise ValueError(f"its encoding is '{message.encoding}'")
+    values = np.frombuffer(np.asarray(message.data).tobytes(), kind)
+    return values.reshape(message.height, message.width).astype(np.float64)
+
+
+def line_of(info: ScanInfo, message: Message) -> LineError:
+    """Return the figures of a line from a ``TrackingError`` message."""
+    first = round(1e-9 * (stamp_of(message) - info.start) / info.sample_period)
+    rms, largest = (message.rms_x, message.rms_y), (message.max_x, message.max_y)
+    return LineError(message.line, first, *rms, *largest)

@@ -18,8 +18,8 @@ from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import TO_AND_FRO, total_samples
 from afm_scan_ros.files.drive_files import save_drive
-from afm_scan_ros.nodes.flow import USUAL_WINDOW, block_size_at
 from afm_scan_ros.nodes.inversion_parameters import INVERSION, ONLINE, inversion_settings
+from afm_scan_ros.nodes.parameters import USUAL_WINDOW, block_size_at
 
 CORRECTED = 2.0
 """Steps of the drive that corrections may add, learned or fed back: as much as the scan itself."""

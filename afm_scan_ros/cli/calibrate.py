@@ -19,7 +19,6 @@ from afm_scan_ros.core.identification.drives.experiments import (
 )
 from afm_scan_ros.core.identification.drives.growth import MotionLimits
 from afm_scan_ros.core.identification.drives.proposal import combined, known_from
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model
@@ -29,7 +28,7 @@ Size = tuple[float | None, float | None]
 OWN_SIZE: Size = None, None
 
 
-def _drive(kind: str, model: ScannerModel | None, size: Size, rate: float | None) -> Plan[Waveform]:
+def _drive(kind: str, model: ScannerModel | None, size: Size, rate: float | None) -> Plan:
     """Drive of a kind, for the scanner of a model, if there is one."""
     if model is not None and kind in EXPERIMENTS:
         plan = EXPERIMENTS[kind].plan_for(model, *size)
@@ -175,7 +174,7 @@ def _export(
 
 def _default_drives(
     scanner: str, name: str | None, model: ScannerModel | None, size: Size, rate: float | None
-) -> list[Plan[Waveform]]:
+) -> list[Plan]:
     """Drives of the library; raises UsageError where these would not fit a scanner."""
     if name is None:
         if scanner != SIM:

@@ -22,12 +22,12 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_plant, load_scan
-from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.nodes.parameters import FLOW
 from afm_scan_ros.report.close_loop import close_loop_report, final_text, reported, round_result
 from afm_scan_ros.report.diagnosis_json import closed_loop_document, diagnosis_of, save_diagnosis
 from afm_scan_ros.report.diagnosis_page import write_diagnosis
 from afm_scan_ros.report.diagnosis_text import next_steps
-from afm_scan_ros.report.provenance import Provenance, Source, heading_lines, provenance_of
+from afm_scan_ros.report.page import Provenance, Source, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 

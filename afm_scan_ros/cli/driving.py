@@ -30,7 +30,6 @@ from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import peak
 from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
@@ -39,11 +38,11 @@ from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.diagnosis import info_of
-from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.drive_files import save_learned
 from afm_scan_ros.files.model_file import model_hash, save_model
 from afm_scan_ros.files.plant_file import save_scan
 from afm_scan_ros.report import plan_text
-from afm_scan_ros.report.provenance import Source, source_of
+from afm_scan_ros.report.page import Source, source_of
 from afm_scan_ros.report.table import Row
 
 
@@ -79,7 +78,7 @@ class DrivenScanner:
             return "--scanner", self.scanner
         return ("--plant", self.plant) if self.plant != PLANT else ()
 
-    def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
+    def record(self, plan: Plan, bag: Path, title: str) -> None:
         """Drive the scanner through a plan, and record it in a bag.
 
         Raises InputError before it begins, ScanError where the record stays incomplete.
@@ -106,7 +105,7 @@ driven_options = grouped(
 """A scanner, which the command gets as ``driven``."""
 
 
-def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan[Waveform]]) -> None:
+def run_calibration(scanner: DrivenScanner, out: Path, plans: Iterable[Plan]) -> None:
     """Record each plan, as ``creep``, in a bag of its name in ``out``.
 
     Raises InputError before the first begins, ScanError where one stays incomplete; all bags are
@@ -160,7 +159,7 @@ class RecordedSession:
         self._recorded(bag, recording.info, len(signals[0].x))
         return Scan(spec, *signals)
 
-    def experiment(self, plan: Plan[Waveform]) -> Record:
+    def experiment(self, plan: Plan) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         bag = self.out / "bags" / plan.name
         run_calibration(self._once(), bag.parent, [plan])
@@ -252,7 +251,7 @@ class PlannedCalibration:
         click.echo(plan_text.kept_text(name, watched.step))
         self._rows.append(plan_text.growth_row(name, largest, watched))
 
-    def _drive(self, plan: Plan[Waveform], step: GrowthStep) -> tuple[Trace, Trace]:
+    def _drive(self, plan: Plan, step: GrowthStep) -> tuple[Trace, Trace]:
         name = plan.name if step.whole else f"{plan.name}_{1e3 * step.share:04.0f}"
         bag = self.out / name if step.whole else self.out / TRIALS / name
         bag.parent.mkdir(parents=True, exist_ok=True)

@@ -16,17 +16,24 @@ from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
 from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.drivers import DriverChoice, load_settings
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes import has_rclpy, lacking_ros
-from afm_scan_ros.nodes.flow import FLOW, USUAL_WINDOW, block_size_at, identity
 from afm_scan_ros.nodes.inversion_parameters import (
     INVERSION,
     MONITORING,
     inversion_settings,
     scan_monitor,
 )
-from afm_scan_ros.nodes.parameters import SIMULATION, checked, simulated_scanner
+from afm_scan_ros.nodes.parameters import (
+    FLOW,
+    SIMULATION,
+    USUAL_WINDOW,
+    block_size_at,
+    checked,
+    identity,
+    simulated_scanner,
+)
 from afm_scan_ros.pipeline import ScanChain, run
 
 

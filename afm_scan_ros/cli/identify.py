@@ -11,18 +11,16 @@ from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.coupled_scanner import CoupledScanner
 from afm_scan_ros.core.effects.registry import FEEDBACK_EFFECTS
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis
-from afm_scan_ros.core.identification.identify import Identification
+from afm_scan_ros.core.identification.identify import FittedAxis, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
-from afm_scan_ros.report.effect_status_text import (
+from afm_scan_ros.report.fit_page import finding_text, fit_report, fit_summary
+from afm_scan_ros.report.sentences import (
     intervals_text,
     status_text,
     unknown_effects,
 )
-from afm_scan_ros.report.fit_page import fit_report
-from afm_scan_ros.report.fit_summary import finding_text, fit_summary
 from afm_scan_ros.report.terminal import say
 
 HEADING = "A scanner's model, written by 'afm-scan identify' from its calibration records."

@@ -59,6 +59,9 @@ def watching(title: str) -> Iterator[tuple[ScanProgress, Callable[[], None]]]:
                 node.create_subscription(topic.kind, topic.name, hear, topic.reader)
             executor.add_node(node)
             yield shown, lambda: executor.spin_once(timeout_sec=MOMENT)
+            last = time.monotonic() + MOMENT
+            while time.monotonic() < last:  # what the nodes said at their end
+                executor.spin_once(timeout_sec=0.0)
             executor.shutdown()
     finally:
         rclpy.shutdown()

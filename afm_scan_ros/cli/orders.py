@@ -15,7 +15,6 @@ from afm_scan_ros.cli.scanner import SIM, ScannerChoice
 from afm_scan_ros.cli.viewing import ScanView, ViewingListener
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -69,7 +68,7 @@ class ScanOrder:
 class RecordOrder:
     """A drive through a plan, recorded in a bag; ``own`` are parameters of the scanner."""
 
-    plan: Plan[Waveform]
+    plan: Plan
     bag: Path
     title: str
     scanner: ScannerChoice

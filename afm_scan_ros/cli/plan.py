@@ -12,7 +12,6 @@ from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import AXES
@@ -22,7 +21,7 @@ from afm_scan_ros.report.plan_text import export_note, plan_table
 from afm_scan_ros.report.terminal import say
 
 
-def export(folder: Path, plans: Sequence[Plan[Waveform]], axes: Sequence[str]) -> None:
+def export(folder: Path, plans: Sequence[Plan], axes: Sequence[str]) -> None:
     """Write drives and a note on their use; report which are done.
 
     Raises InputError, before anything is written, where the folder cannot take them.

@@ -21,7 +21,7 @@ from typing import IO
 from attrs import field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes.flow import STOPPED
+from afm_scan_ros.nodes.parameters import STOPPED
 from afm_scan_ros.pipeline import TRACEBACK, handling
 
 _FIRST, _COUNT = 1, 101  # ROS 2's domains whose ports no system hands out otherwise

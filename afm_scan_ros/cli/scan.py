@@ -28,13 +28,12 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned
 from afm_scan_ros.files.model_file import load_model
 from afm_scan_ros.files.plant_file import load_scan
 from afm_scan_ros.files.records import naming
-from afm_scan_ros.nodes.flow import FLOW, TIME_SCALE
 from afm_scan_ros.nodes.inversion_parameters import ONLINE
-from afm_scan_ros.nodes.parameters import checked, inverses_of
+from afm_scan_ros.nodes.parameters import FLOW, TIME_SCALE, checked, inverses_of
 
 
 def run_scan(

@@ -17,7 +17,6 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
@@ -40,7 +39,7 @@ def exchange_of(scanner: str) -> FileExchange | None:
     return FileExchange(load_settings(FILES, Path(file))) if kind == FILES and file else None
 
 
-def record_by_files(exchange: FileExchange, plan: Plan[Waveform], bag: Path) -> None:
+def record_by_files(exchange: FileExchange, plan: Plan, bag: Path) -> None:
     """Record one drive in a bag."""
     drive = excitation_block(plan, 0, plan.total_samples)
     info = ScanInfo(bag.name, time.time_ns(), plan.name, plan.sample_period, plan.total_samples)

@@ -15,7 +15,6 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, INSUFFICIENT
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.record import Record
@@ -72,7 +71,7 @@ class ScannerSession(Protocol):
         """Scan with all of a model's inverses; raises InputError or ScanError where it cannot."""
         ...
 
-    def experiment(self, plan: Plan[Waveform]) -> Record:
+    def experiment(self, plan: Plan) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         ...
 

@@ -9,6 +9,7 @@ from attrs import define, field, frozen
 from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+Complex: TypeAlias = NDArray[np.complex128]
 
 AXES = ("x", "y")
 

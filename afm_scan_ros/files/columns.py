@@ -139,7 +139,6 @@ def _by_units(sources: Sequence[_Source], use: str) -> tuple[Column, ...]:
 
 
 def _by_unit(source: _Source) -> str:
-    """Name a column by its unit, as ``drive_x``."""
     unit = bare_unit(source.unit)
     if unit in SECONDS:
         return TIME

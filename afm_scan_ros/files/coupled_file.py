@@ -15,8 +15,8 @@ from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import feedback_form
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.files import yaml
+from afm_scan_ros.files.arrays import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.model_file import AddedEffect, listed, values_of
-from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, to_mapping
 
 MATRICES = ("a", "b", "c", "d")

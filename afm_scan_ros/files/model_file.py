@@ -45,8 +45,7 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files import effect_records as base
 from afm_scan_ros.files import yaml
-from afm_scan_ros.files.arrays import Archive
-from afm_scan_ros.files.model_pair import arrays_beside, load_sealed, saved_arrays, sealed
+from afm_scan_ros.files.arrays import Archive, arrays_beside, load_sealed, saved_arrays, sealed
 from afm_scan_ros.files.records import from_mapping, naming, recast, refuse_unknown, to_mapping
 
 ROOM = 0.01

@@ -1,4 +1,4 @@
-"""The nodes, each a module of its name and a class, and how a process starts one.
+"""The nodes, and how a process starts one.
 
 A node's modules take seconds to import, so this one imports little. A signal in this time ends the
 process at once, without a traceback and with status 0: nothing has begun that could fail.
@@ -12,18 +12,18 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-NODES = (
-    "trajectory_generator",
-    "excitation_generator",
-    "inversion_compensator",
-    "piezoscanner_sim",
-    "scanner_driver",
-    "scan_recorder",
-    "scan_imager",
-    "tracking_monitor",
-    "residual_monitor",
-)
-
+NODES = {
+    "trajectory_generator": "block_source",
+    "excitation_generator": "block_source",
+    "inversion_compensator": "inversion_compensator",
+    "piezoscanner_sim": "scanner_node",
+    "scanner_driver": "scanner_node",
+    "scan_recorder": "scan_recorder",
+    "scan_imager": "scan_imager",
+    "tracking_monitor": "tracking_monitor",
+    "residual_monitor": "residual_monitor",
+}
+"""Each node, and the module of its class, as ``ScanImager`` of ``scan_imager``."""
 
 _INPUT = 0
 

@@ -1,22 +1,43 @@
-"""Base of nodes that generate blocks: it announces, starts and paces the scan."""
+"""The sources of a scan: they announce, start and pace it, and generate its blocks."""
 
 import time
 from abc import abstractmethod
 from collections.abc import Mapping
 from math import ceil
+from pathlib import Path
 
 from attrs import evolve
 from rclpy.duration import Duration
+from std_srvs.srv import Trigger
 
 from afm_scan_ros.bag.scan_info import encode_block
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.scan_info import ScanInfo
+from afm_scan_ros.core.identification.drives.excitation import excitation_block
+from afm_scan_ros.core.identification.drives.experiments import KINDS, resized
+from afm_scan_ros.core.model import INVERSES
+from afm_scan_ros.core.scan_info import ScanInfo, info_of_scan
+from afm_scan_ros.core.trajectory import desired, phases, stopped, stopped_total
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.nodes.flow import MAX_MESSAGE_RATE, USUAL_WINDOW, block_size_at
-from afm_scan_ros.nodes.messages import Outbox, info_message
+from afm_scan_ros.files.drive_files import read_drive
+from afm_scan_ros.files.model_file import model_hash
+from afm_scan_ros.nodes.declare import scan_spec
+from afm_scan_ros.nodes.messages import Message, Outbox, info_message
+from afm_scan_ros.nodes.parameters import (
+    FLOW,
+    MAX_MESSAGE_RATE,
+    MODEL_FILE,
+    STOPPED,
+    USUAL_WINDOW,
+    NodeParameter,
+    block_size_at,
+    identity,
+    inverses_of,
+    model_of,
+    taking_part,
+)
 from afm_scan_ros.nodes.peers import DONE, READY, RUNNING
 from afm_scan_ros.nodes.scan_node import ScanNode
-from afm_scan_ros.nodes.topics import SCAN_INFO, NodeTopic
+from afm_scan_ros.nodes.topics import DESIRED, DRIVE, SCAN_INFO, NodeTopic
 
 
 class BlockSource(ScanNode):
@@ -150,7 +171,6 @@ class BlockSource(ScanNode):
         return float(self._start + elapsed)
 
     def _log_progress(self, before: int, after: int) -> None:
-        """Log each tenth of the scan."""
         if (tenth := 10 * after // self.total) > 10 * before // self.total:
             self.get_logger().info(f"{10 * tenth} %: sample {after} of {self.total} is sent")
 
@@ -164,3 +184,84 @@ class BlockSource(ScanNode):
                 f"block_size = {size} makes more than {MAX_MESSAGE_RATE:g} messages a second:"
                 f" give at least {ceil(1.0 / rate)}"
             )
+
+
+class TrajectoryGenerator(BlockSource):
+    """The source of a scan; ``stop`` lets it end early, smoothly at rest at zero."""
+
+    NAME = "trajectory_generator"
+
+    PARAMETERS = (
+        *FLOW,
+        taking_part("inversion_compensator", "piezoscanner_sim", "scan_recorder"),
+        NodeParameter("inverses", list(INVERSES), "Effects that the compensator inverts; or none"),
+        MODEL_FILE,
+    )
+
+    def __init__(self) -> None:
+        super().__init__(DESIRED)
+        self._spec = scan_spec(self)
+        self._stopped_at: int | None = None
+        desired(self._spec, phases(self._spec).lines.start, 1)  # a line is computed here, not later
+        self.create_service(Trigger, "stop", self._stop)
+        info = evolve(
+            info_of_scan(self._spec, *identity(self.settings["scan_id"])),
+            inverses=tuple(sorted(inverses_of(self.settings["inverses"], INVERSES))),
+            model_hash=model_hash(model_of(self.settings)),
+            nodes=self.nodes(),
+        )
+        self.announce(info)
+
+    def block(self, first: int, count: int) -> Trace:
+        """Return desired displacement, m."""
+        if self._stopped_at is None:
+            return desired(self._spec, first, count)
+        return stopped(self._spec, self._stopped_at, first, count)
+
+    def _stop(self, _: Message, response: Message) -> Message:
+        response.success = self.state == RUNNING
+        if self.state != RUNNING:
+            response.message = f"nothing to stop: the generator is {self.state}"
+            return response
+        if self._stopped_at is None:
+            self._stopped_at = self.next_sample
+            self.total = stopped_total(self._spec, self.next_sample)
+            self.reason = f"{STOPPED} at sample {self.next_sample}"
+        response.message = self.reason
+        return response
+
+
+class ExcitationGenerator(BlockSource):
+    """The source of a calibration record or experiment: the drive itself, without an inverse."""
+
+    NAME = "excitation_generator"
+
+    PARAMETERS = (
+        *FLOW,
+        taking_part("piezoscanner_sim", "scan_recorder"),
+        NodeParameter("kind", "creep", "Kind of record", choices=tuple(KINDS)),
+        NodeParameter("amplitude_v", 0.0, "Amplitude; 0 for that of the kind", low=0.0),
+        NodeParameter("duration_s", 0.0, "Length; 0 for that of the kind", low=0.0),
+        NodeParameter(
+            "drive_file", "", "Drive in place of a kind: .npz with drive_v (n, 2), sample_period_s"
+        ),
+    )
+
+    def __init__(self) -> None:
+        super().__init__(DRIVE)
+        sizes = (self.settings[name] or None for name in ("amplitude_v", "duration_s"))
+        file = self.settings["drive_file"]
+        plan = read_drive(Path(file)) if file else KINDS[self.settings["kind"]]()
+        self._plan = resized(plan, *sizes)
+        info = ScanInfo(
+            *identity(self.settings["scan_id"]),
+            self._plan.name,
+            self._plan.sample_period,
+            self._plan.total_samples,
+            nodes=self.nodes(),
+        )
+        self.announce(info)
+
+    def block(self, first: int, count: int) -> Trace:
+        """Return drive voltage, V."""
+        return excitation_block(self._plan, first, count)

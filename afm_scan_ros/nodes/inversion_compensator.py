@@ -10,7 +10,7 @@ from afm_scan_ros.core.scan_inversion import ScanInversion
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.files.records import naming
 from afm_scan_ros.nodes.block_consumer import BlockConsumer, min_subscriptions, spec_of

@@ -6,7 +6,7 @@ from typing import Any
 from afm_scan_ros import features
 from afm_scan_ros.core.diagnosis.monitor import ALARM_RATIO, LINES, ResidualWatch
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor
-from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight, Weight
+from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.model import INVERSES, InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_inversion import LATENCY, InversionSettings
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -77,12 +77,13 @@ MONITORING = (
 def inversion_settings(settings: Mapping[str, Any]) -> InversionSettings:
     """Return how a scan is inverted by the parameters ``INVERSION``; refuses limits of zero."""
     given = settings
+    corner, order = given["weight_corner_hz"], given["weight_order"]
     return InversionSettings(
         inverses_of(given["inverses"], INVERSES),
         drive_limits(given),
         InverseSettings(
             hysteresis_inverse=given["hysteresis_inverse"],
-            weight=_weight(given["weight_corner_hz"], given["weight_order"]),
+            weight=SmoothWeight(corner, order) if corner else RelativeWeight(order=order),
             preview=given["preview_ms"] * 1e-3 or None,
         ),
         corrections=tuple(e.correction(given) for name, e in ONLINE.items() if given[name]),
@@ -99,7 +100,3 @@ def scan_monitor(model: ScannerModel, spec: ScanSpec, settings: Mapping[str, Any
     ]
     watch = ResidualWatch(settings["alarm"], settings["alarm_lines"])
     return ScanMonitor(model, spec, watch, trackers)
-
-
-def _weight(corner: float, order: int) -> Weight | RelativeWeight:
-    return SmoothWeight(corner, order) if corner else RelativeWeight(order=order)

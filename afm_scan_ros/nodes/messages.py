@@ -5,7 +5,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from attrs import asdict, define, field
+from attrs import define, field
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image
@@ -14,10 +14,9 @@ from std_msgs.msg import Header
 from afm_scan_ros.bag.scan_info import Block, decode_block, info_fields
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_info import ScanInfo
-from afm_scan_ros.core.streams import MAX_BLOCK, LineError, MonitorSample
+from afm_scan_ros.core.streams import MAX_BLOCK
 from afm_scan_ros.core.types import AXES, Array, Trace
-from afm_scan_ros.msg import MonitorSample as MonitorSampleMessage
-from afm_scan_ros.msg import NodeState, TrackingError
+from afm_scan_ros.msg import NodeState
 from afm_scan_ros.msg import ScanInfo as ScanInfoMessage
 
 if TYPE_CHECKING:
@@ -112,19 +111,6 @@ class BlockGuard:
 def info_message(info: ScanInfo) -> Message:
     """Return the message that announces a scan."""
     return ScanInfoMessage(header=_header(info, 0), **info_fields(info))
-
-
-def tracking_message(info: ScanInfo, error: LineError) -> Message:
-    """Return the error of one line as a message."""
-    figures = asdict(error, filter=lambda each, _: each.name != "first_sample")
-    header = _header(info, error.first_sample)
-    return TrackingError(header=header, scan_id=info.scan_id, **figures)
-
-
-def monitor_message(info: ScanInfo, sample: MonitorSample) -> Message:
-    """Return one sample for viewers as a message."""
-    header = _header(info, sample.sample)
-    return MonitorSampleMessage(header=header, scan_id=info.scan_id, **asdict(sample))
 
 
 def image_message(info: ScanInfo, heights: "array[int]", columns: int, sample: int) -> Message:

@@ -15,8 +15,17 @@ from afm_scan_ros.nodes.shared_memory import MEMORY, clear
 FAST_DDS, CYCLONE = "rmw_fastrtps_cpp", "rmw_cyclonedds_cpp"
 
 
-def prepare(environment: MutableMapping[str, str] = os.environ) -> list[str]:
+OF_NODES, OF_VIEWERS = "fastdds.xml", "fastdds_viewer.xml"
+"""Profiles of Fast DDS in ``config``. By those of viewers, which have UDP alone, no node has a
+queue in shared memory for a viewer that may be stopped or killed."""
+
+
+def prepare(
+    environment: MutableMapping[str, str] = os.environ, profiles: str = OF_NODES
+) -> list[str]:
     """Set the middleware up and clear what dead processes left; return warnings, a sentence each.
+
+    With Fast DDS the ``profiles`` are a file of ``config``.
 
     Call it before ``rclpy.init``, and write the warnings before it too: a file in shared memory
     that could not be removed may hang it. Raises FileNotFoundError for a broken installation.
@@ -25,7 +34,7 @@ def prepare(environment: MutableMapping[str, str] = os.environ) -> list[str]:
     if name == CYCLONE:
         return _prepare_cyclone(environment)
     if name == FAST_DDS:
-        return [*_prepare_fast_dds(environment), *clear(), *lacks_room()]
+        return [*_prepare_fast_dds(environment, profiles), *clear(), *lacks_room()]
     tried = f"{FAST_DDS} and {CYCLONE} were"
     return [f"RMW_IMPLEMENTATION={name} was not tried with this package; {tried}"]
 
@@ -91,20 +100,20 @@ KEPT = 15_000
 _HOLDS_UP = "a viewer that is slow, stopped or killed can hold up the scan"
 
 
-def _prepare_fast_dds(environment: MutableMapping[str, str]) -> list[str]:
+def _prepare_fast_dds(environment: MutableMapping[str, str], profiles: str) -> list[str]:
     """Let Fast DDS read our profiles, unless it reads the user's."""
-    ours = share_directory() / "config" / "fastdds.xml"
+    ours = share_directory() / "config"
     said, files = [], []
-    if given := environment.get(PROFILES):
+    given = environment.get(PROFILES, "")
+    if given and Path(given).parent != ours:
         files.append(Path(given))
-    elif newer := environment.get(NEWER):
+    elif not given and (newer := environment.get(NEWER)):
         said.append(f"{NEWER}={newer} is not read by Jazzy's Fast DDS: set {PROFILES} instead")
     if environment.get("SKIP_DEFAULT_XML_FILE") != "1" and Path(LOCAL).is_file():
         files.append(Path(LOCAL).absolute())
     if not files:
-        environment[PROFILES] = str(ours)
-    users = [file for file in files if file != ours]
-    return [*said, *(sentence for file in users for sentence in lacking(file, environment))]
+        environment[PROFILES] = str(ours / profiles)
+    return [*said, *(sentence for file in files for sentence in lacking(file, environment))]
 
 
 def lacks_room(memory: Path = MEMORY) -> list[str]:
@@ -156,7 +165,6 @@ def _lacks_memory(root: ET.Element, environment: Mapping[str, str]) -> Iterator[
 
 
 def _lacks_heartbeats(root: ET.Element) -> Iterator[str]:
-    """Look at the default writer."""
     writer = next(_defaults(root, "data_writer", "publisher"), None)
     if writer is None:
         yield (

@@ -1,7 +1,10 @@
 """Parameters of the nodes: name, type, description, range; and what is made of their values."""
 
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping
+from datetime import UTC, datetime
+from math import ceil
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +16,7 @@ from afm_scan_ros.core.limits import AmplifierSpec, DriveLimits
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_inversion import MakeCorrection
 from afm_scan_ros.core.scan_spec import ScanSpec, human_name, scan_parameters
+from afm_scan_ros.core.streams import MAX_BLOCK
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, ScannerSettings
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
@@ -157,3 +161,66 @@ def _for_people(attribute: "Attribute[Any]") -> NodeParameter:
 
 def _in_unit(value: float, scale: float) -> float:
     return float(f"{value / scale:.12g}")  # 40e-6 / 1e-6 is 39.99… otherwise
+
+
+STOPPED = "stopped by request"
+"""Begins the reason of a scan that is done, though not whole."""
+
+MAX_MESSAGE_RATE = 200.0
+"""Messages a second that a topic may carry in real time."""
+
+USUAL_RATE = 50.0
+"""Blocks a second of scan time, where nobody states their size: rclpy passes on a thousand."""
+LEAST_BLOCK = 100
+"""Samples."""
+USUAL_WINDOW = 20
+"""Blocks: 0.4 s of a scan, in which the inverse's preview and two blocks have to fit."""
+
+TIME_SCALE = NodeParameter(
+    "time_scale", 1.0, "Duration over scan time: 1 for real time, 0 for no pacing", low=0.0
+)
+FLOW = (
+    NodeParameter(
+        "block_size",
+        0,
+        f"Samples in a block; 0 for {USUAL_RATE:g} blocks a second of the scan, of"
+        f" {LEAST_BLOCK} to {MAX_BLOCK} samples",
+        low=0,
+        high=MAX_BLOCK,
+    ),
+    NodeParameter(
+        "window",
+        0,
+        f"Largest lead over the slowest node, in samples; 0 for {USUAL_WINDOW} blocks",
+        low=0,
+    ),
+    TIME_SCALE,
+    NodeParameter("min_subscriptions", 2, "Readers that the scan waits for", low=0),
+    NodeParameter("scan_id", "", "Name of the scan; empty for its start time"),
+    NodeParameter(
+        "sampling_instant",
+        "before_update",
+        "When the sensor's samples are taken, seen from the converter's update",
+        choices=("before_update", "after_update"),
+    ),
+    NodeParameter("trigger_offset_s", 0.0, "Time from the converter's update to the sample"),
+)
+
+
+def block_size_at(sample_period: float) -> int:
+    """Return how many samples a block has where nobody says it; ``sample_period`` in s."""
+    return min(MAX_BLOCK, max(LEAST_BLOCK, ceil(1.0 / (USUAL_RATE * sample_period) - 1e-9)))
+
+
+def identity(scan_id: str) -> tuple[str, int]:
+    """Return a scan's id, by default its start time, and the time, ns, at which it begins."""
+    start = time.time_ns()
+    moment = datetime.fromtimestamp(start / 1e9, UTC)
+    return scan_id or moment.strftime("%Y%m%dT%H%M%S.%fZ"), start
+
+
+def taking_part(*nodes: str) -> NodeParameter:
+    """Declare the nodes that take part in a scan beside its source."""
+    return NodeParameter(
+        "required_nodes", list(nodes), "Nodes that take part, in the order of data flow"
+    )

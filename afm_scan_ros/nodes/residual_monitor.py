@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from afm_scan_ros.bag.scan_info import encode_line
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanMonitor, ScanNews
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -11,7 +12,6 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.model_file import model_hash
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.inversion_parameters import MONITORING, scan_monitor
-from afm_scan_ros.nodes.messages import tracking_message
 from afm_scan_ros.nodes.parameters import MODEL_FILE, model_of
 from afm_scan_ros.nodes.peers import RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, MODEL_RESIDUAL, NodeTopic
@@ -58,7 +58,7 @@ class ResidualMonitor(StreamReader):
             if isinstance(found, ScanNews):
                 self.announce(found)
             else:
-                self.publish(MODEL_RESIDUAL, tracking_message(self.scan, found))
+                self.publish(MODEL_RESIDUAL, encode_line(self.scan, found))
 
     def go(self, state: str, reason: str = "") -> None:
         """Enter a state; while nothing else is to be said, an alarm that stands is its reason."""

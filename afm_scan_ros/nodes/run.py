@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.nodes import middleware
+from afm_scan_ros.nodes import NODES, middleware
 from afm_scan_ros.nodes.declare import undeclared
 from afm_scan_ros.nodes.diagnostics import Diagnostics
 from afm_scan_ros.nodes.ending import end_within
@@ -33,8 +33,8 @@ AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def node_class(name: str) -> type[ScanNode]:
-    """Import the module of a node, and return its class, as ``ScanImager`` of ``scan_imager``."""
-    module = import_module(f"afm_scan_ros.nodes.{name}")
+    """Import the module of a node, and return its class."""
+    module = import_module(f"afm_scan_ros.nodes.{NODES[name]}")
     found: type[ScanNode] = getattr(module, name.title().replace("_", ""))
     return found
 
@@ -103,12 +103,12 @@ def _report_refusal(kind: type[ScanNode], error: InputError) -> None:
     node.destroy_node()
 
 
-def join(arguments: list[str] | None = None) -> None:
+def join(arguments: list[str] | None = None, profiles: str = middleware.OF_NODES) -> None:
     """Join ROS with the arguments of a command line, by default this process's.
 
     What is to be known of the middleware goes to stderr before, since it may be why joining hangs.
     """
-    for warning in middleware.prepare():
+    for warning in middleware.prepare(profiles=profiles):
         sys.stderr.write(f"{warning}\n")
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -14,7 +14,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.image_lines import Imaged, ImageLines, frame_of
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
-from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.files.plant_file import load_sample
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
@@ -96,7 +96,6 @@ class ScanImager(StreamReader):
 
 
 def _check_room(lines: int, pixels: int) -> None:
-    """Raise InputError where there is no room for both images."""
     try:
         np.empty((2, lines, pixels), np.float32)
     except (MemoryError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Base of the nodes that move a scanner: drive voltage in, displacement out."""
+"""The nodes that move a scanner, a simulated one or any: drive voltage in, displacement out."""
 
 import time
 from abc import abstractmethod
@@ -12,11 +12,13 @@ from afm_scan_ros.core.limits import refuse_step
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import MAX_BLOCK, cut_as, end
 from afm_scan_ros.core.types import AXES, Trace
-from afm_scan_ros.drivers import DriverChoice
+from afm_scan_ros.drivers import DriverChoice, load_settings, settings_file
 from afm_scan_ros.drivers.client import DriverProcess
 from afm_scan_ros.drivers.link import DriverTimeouts
-from afm_scan_ros.nodes.block_consumer import ManagedConsumer
-from afm_scan_ros.nodes.parameters import NodeParameter
+from afm_scan_ros.files.records import naming
+from afm_scan_ros.nodes.block_consumer import min_subscriptions
+from afm_scan_ros.nodes.managed_consumer import AUTOSTART, ManagedConsumer
+from afm_scan_ros.nodes.parameters import SIMULATION, NodeParameter, simulated_scanner
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, TRUE, NodeTopic
 
@@ -211,3 +213,43 @@ class ScannerNode(ManagedConsumer):
         self.advance_to(end(moved[-1][0]))
         if last:
             self.go(DONE)
+
+
+class PiezoscannerSim(ScannerNode):
+    """The scanner of a plant file, in simulation."""
+
+    NAME = "piezoscanner_sim"
+    PARAMETERS = (
+        *SIMULATION,
+        AUTOSTART,
+        *TIMEOUTS,
+        min_subscriptions(1),
+        min_subscriptions(1, of="true_"),
+    )
+
+    def choice(self) -> DriverChoice:
+        """Return the simulated scanner; refuses a wrong plant file."""
+        return simulated_scanner(self.settings, self.NAME)
+
+
+class ScannerDriver(ScannerNode):
+    """The scanner of a driver and its settings file."""
+
+    NAME = "scanner_driver"
+
+    PARAMETERS = (
+        NodeParameter("driver", "", "module:Class, or a short name as simulated"),
+        NodeParameter("settings_file", "", "Settings of the scanner and of its driver, in YAML"),
+        AUTOSTART,
+        *TIMEOUTS,
+        min_subscriptions(1),
+        min_subscriptions(0, of="true_"),
+    )
+
+    def choice(self) -> DriverChoice:
+        """Return the driver that the parameters name; raises InputError where one is missing."""
+        if not (driver := self.settings["driver"]):
+            raise InputError("parameter driver: give it, as -p driver:=mylab:Stage")
+        with naming("parameter settings_file"):
+            file = settings_file(driver, self.settings["settings_file"])
+            return load_settings(driver, file)

@@ -5,13 +5,12 @@ from contextlib import suppress
 
 from rclpy._rclpy_pybind11 import RCLError
 
-from afm_scan_ros.bag.scan_info import decode_block
+from afm_scan_ros.bag.scan_info import decode_block, encode_line, encode_sample
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineErrors, MonitorSamples
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, spec_of
-from afm_scan_ros.nodes.messages import monitor_message, tracking_message
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, DRIVE, MONITOR, TRACKING_ERROR, NodeTopic
 
 
@@ -40,14 +39,14 @@ class TrackingMonitor(StreamReader):
     def consume(self, topic: NodeTopic, block: Trace, *, last: bool) -> None:  # noqa: ARG002 - lines end by themselves
         """Publish the lines that a block makes whole, and the samples."""
         for error in self._errors.add(topic.name, block):
-            self.publish(TRACKING_ERROR, tracking_message(self.scan, error))
+            self.publish(TRACKING_ERROR, encode_line(self.scan, error))
         self._show(topic, block)
 
     def _show(self, topic: NodeTopic, block: Trace) -> None:
         """Publish the samples that a block completes, whether or not anybody gets them."""
         for sample in self._samples.add(topic.name, block):
             with suppress(RCLError):
-                self._viewers.publish(monitor_message(self.scan, sample))
+                self._viewers.publish(encode_sample(self.scan, sample))
 
     def _hear_drive(self, cdr: bytes, _: int) -> None:
         if self.info is None or self.leaving:

@@ -15,6 +15,7 @@ from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED
 from afm_scan_ros.core.types import AXES, Array, Trace
+from afm_scan_ros.report.sentences import sentence
 
 OTHER_RANGE = 0.05
 """Share by which the desired range may differ from what is stated: samples miss the very turns."""
@@ -56,17 +57,10 @@ def scan_spec(recording: ScanRecording) -> ScanSpec:
     """Return what the scan was to be; raises InputError for a record that is not a scan."""
     spec = recording.info.spec
     if not recording.stated:
-        raise InputError(
-            f"{recording.path}: holds no scan_info, so which samples are lines of a scan is"
-            " unknown: record this topic too. 'afm-scan diagnose' needs none, nor does this"
-            " command without --report and --figure where desired_displacement is recorded"
-        )
+        raise InputError(sentence("analysis.no_scan_info", path=recording.path))
     if spec is None:
-        raise InputError(
-            f"{recording.path}: scan_info calls it '{recording.info.pattern}', which is not a scan."
-            " Give a calibration record to 'afm-scan identify'. Compare an imported record with"
-            " desired_x or desired_y without --report and --figure"
-        )
+        kind = recording.info.pattern
+        raise InputError(sentence("analysis.no_scan", path=recording.path, kind=kind))
     return spec
 
 
@@ -88,9 +82,8 @@ def analyse(recording: ScanRecording) -> Analysis:
     measured = meters[ACHIEVED].tracking()
     true = meters.get("true_displacement")
     total = recording.info.total_samples
-    incomplete = (
-        f"{recording.path}: the scan is incomplete: it has {measured.samples} of {total} samples"
-    )
+    counts = {"samples": measured.samples, "total": total}
+    incomplete = sentence("analysis.incomplete", path=recording.path, **counts)
     return Analysis(
         bag=str(recording.path),
         scan=recording.info,
@@ -120,10 +113,8 @@ def _doubts(recording: ScanRecording, measured: Tracking, ends: list[Ends]) -> I
         if doubt := sensor_doubt(axis, moved, lowest.min(), highest.max()):
             yield f"{recording.path}: {doubt}"
         if complete and not isclose(moved, planned, rel_tol=OTHER_RANGE):
-            yield (
-                f"{recording.path}: scan_info states a range of {planned:g} m in {axis}, and the"
-                f" desired displacement spans {moved:g} m"
-            )
+            ranges = {"planned": planned, "moved": moved}
+            yield sentence("analysis.other_range", path=recording.path, axis=axis, **ranges)
 
 
 def _drive_range(recording: ScanRecording) -> DriveRange | None:

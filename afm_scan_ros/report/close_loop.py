@@ -8,12 +8,12 @@ from afm_scan_ros.core.metrics import Tracking
 from afm_scan_ros.core.trajectory import TO_AND_FRO
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report import diagnosis_text as text
-from afm_scan_ros.report.page import PageLink, ReportPage, Section
+from afm_scan_ros.report.page import PageLink, Provenance, ReportPage, Section
 from afm_scan_ros.report.page import Part as PagePart
 from afm_scan_ros.report.picture import Picture
-from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres
 from afm_scan_ros.report.scan_pictures import TwoScans, error_picture, image_picture, images_of
+from afm_scan_ros.report.sentences import sentence
 from afm_scan_ros.report.table import Part, Rows
 
 Row = tuple[str, ...]
@@ -29,10 +29,6 @@ TRACKING = (
 """No wider than a terminal's 80 columns."""
 RESIDUAL = ("residual, rms in nm", "axis", "detection limit", "model", "extended model")
 NAMES = ("with the model's inverse", "with the extended model's inverse")
-REPLAYED = (
-    "The simulated drift restarts with each scan, and so does its inverse, so all of it is"
-    " compensated. A real drift does not restart. Its inverse helps only as far as it repeats."
-)
 
 
 def _trial_rows(done: Round, cells: Callable[[ScanComparison, str], Iterable[str]]) -> list[Row]:
@@ -46,7 +42,6 @@ def _trial_rows(done: Round, cells: Callable[[ScanComparison, str], Iterable[str
 
 
 def _tracked(trial: ScanComparison, axis: str) -> Iterator[str]:
-    """Yield the errors before and after."""
     yield _change(trial.measured_before, trial.measured_after, axis, "all")
     for part in ("all", "constant_speed", "turnarounds"):
         yield _change(trial.true_before, trial.true_after, axis, part)
@@ -68,7 +63,7 @@ def round_result(done: Round) -> Iterator[Part]:
     yield from text.verdict_text(done.diagnosis)
     yield from text.effects(done.diagnosis)
     yield text.residuals(done.diagnosis)
-    yield text.HELD_OUT
+    yield sentence("residual.of_all_records")
     if done.comparisons:
         yield Rows(TRACKING, _trial_rows(done, _tracked))
     yield from outcome(done)
@@ -78,63 +73,41 @@ def outcome(done: Round) -> Iterator[str]:
     """Yield what limits a round's verdict, and what its extended model changed."""
     yield from text.limits_text(done.diagnosis)
     if done.experiments:
-        yield f"Experiments recorded to resolve an ambiguity: {', '.join(done.experiments)}."
+        yield sentence("loop.experiments", names=done.experiments)
     if done.diagnosis.effects and not done.comparisons and not done.refusal:
-        yield "The model contains every effect that was found. The loop ends."
+        yield sentence("loop.complete")
     if done.refusal:
-        yield f"The extended model's inverse cannot make these scans: {done.refusal}."
+        yield sentence("loop.refused", why=done.refusal)
     for (name, axis), ratio in done.worse.items():
-        yield (
-            f"With the extended model the error of '{name}' in {axis} is {ratio:.2f} times as"
-            " large. The model is not replaced."
-        )
+        yield sentence("loop.worse", name=name, axis=axis, ratio=ratio)
     yield from _reservations(done)
     if done.kept:
-        ratios = ", ".join(
-            f"{r:.2f} in {axis}" for axis, r in done.comparisons[FIRST].change.items()
-        )
-        yield f"Measured error of the same scan, extended model over model: {ratios}."
+        yield sentence("loop.changed", change=done.comparisons[FIRST].change)
         if not done.improved:
-            yield "This is no improvement, so the loop ends."
+            yield sentence("loop.not_improved")
 
 
 def _reservations(done: Round) -> Iterator[str]:
     """Yield what the errors of these scans do not show."""
-    if not done.comparisons:
-        return
-    if any(effect.name == "drift" for effect in done.diagnosis.effects):
-        yield REPLAYED
-    own = sorted({e.name for e in done.diagnosis.effects if any(v.parameter.own for v in e.values)})
-    if own:
-        yield (
-            f"A part of {' and '.join(own)} differs in every record and cannot be predicted. In the"
-            " residual of the held-out scans this part is fitted to each scan."
-        )
+    effects = done.diagnosis.effects if done.comparisons else ()
+    if any(effect.name == "drift" for effect in effects):
+        yield sentence("loop.replayed")
+    if own := sorted({e.name for e in effects if any(v.parameter.own for v in e.values)}):
+        yield sentence("loop.own", names=own)
 
 
 def final_text(rounds: Sequence[Round], failure: str = "") -> Iterator[str]:
     """Yield how the loop ended, in sentences; ``failure`` is what ended the next round, if any."""
     if failure:
-        yield f"Round {len(rounds) + 1} failed: {failure}. The results are those before it."
+        yield sentence("loop.failed", number=len(rounds) + 1, why=failure)
     kept = [done for done in rounds if done.improved]
     if not kept:
-        yield "No extended model reduced the tracking error."
+        yield sentence("loop.not_reduced")
         return
     first, last = kept[0].comparisons[FIRST], kept[-1].comparisons[FIRST]
     for axis in AXES:
         change = _change(first.measured_before, last.measured_after, axis, "all")
-        yield f"Tracking error in {axis}, measured, rms: {change} nm."
-
-
-METHOD = (
-    "Each scan uses all inverses of its model. The error is achieved minus desired displacement,"
-    " rms about zero, without the first line. Nothing is fitted to it. 'Measured' contains sensor"
-    " noise, 'true' does not. For y, constant speed is the part on trace."
-)
-UNSEEN = (
-    "The residual is measured minus predicted displacement, without its mean. It is that of the"
-    " whole scans made with the extended model's inverse, which no fit saw."
-)
+        yield sentence("loop.reduced", axis=axis, change=change)
 
 
 def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = "") -> ReportPage:
@@ -150,7 +123,7 @@ def close_loop_report(rounds: Sequence[Round], of: Provenance, failure: str = ""
         next_steps=list(text.next_steps(found)),
         evidence=[
             *(_round(number, done, first=number == shown) for number, done in numbered),
-            Section("Method", [METHOD]),
+            Section("Method", [sentence("loop.method")]),
         ],
         warnings=of.shortcomings,
         provenance=of,
@@ -162,22 +135,17 @@ def _round(number: int, done: Round, *, first: bool) -> Section:
     parts: list[PagePart] = list(round_result(done))
     parts.append(PageLink(f"Diagnosis of round {number}", f"round_{number}/report.html"))
     if done.comparisons:
-        parts += [Rows(RESIDUAL, _trial_rows(done, _left)), UNSEEN]
+        parts += [Rows(RESIDUAL, _trial_rows(done, _left)), sentence("loop.unseen")]
         parts += [] if first else [_lines(done, number)]
-        parts.append(_grating(done, number))
+        imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
+        images = images_of(TwoScans.of(done.before[imaged], done.after[imaged], *NAMES))
+        parts.append(image_picture(f"grating_{number}", images, f"as '{imaged}'"))
     return Section(f"Round {number}: {done.diagnosis.verdict.replace('_', ' ')}", parts)
 
 
 def _lines(done: Round, number: int) -> Picture:
     scans = TwoScans.of(done.before[FIRST], done.after[FIRST], *NAMES)
     return error_picture(f"lines_{number}", scans)
-
-
-def _grating(done: Round, number: int) -> Picture:
-    """Show a grating as a scan with either inverse images it."""
-    imaged = next(n for n, scan in done.before.items() if scan.spec.pattern in TO_AND_FRO)
-    images = images_of(TwoScans.of(done.before[imaged], done.after[imaged], *NAMES))
-    return image_picture(f"grating_{number}", images, f"as '{imaged}'")
 
 
 def _change(before: Tracking | None, after: Tracking | None, axis: str, part: str) -> str:

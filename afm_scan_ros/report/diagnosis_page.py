@@ -23,27 +23,13 @@ from afm_scan_ros.files.coupled_file import save_coupled
 from afm_scan_ros.files.model_file import save_model
 from afm_scan_ros.report import diagnosis_text as text
 from afm_scan_ros.report.diagnosis_json import account_document, save_diagnosis
-from afm_scan_ros.report.page import ReportPage, Section
+from afm_scan_ros.report.page import Provenance, ReportPage, Section, heading_lines
 from afm_scan_ros.report.picture import Picture
-from afm_scan_ros.report.provenance import Provenance, heading_lines
-from afm_scan_ros.report.quantity import CONVENTION, nanometres, significant
+from afm_scan_ros.report.quantity import nanometres, probability, significant
 from afm_scan_ros.report.residual import initial_state_text, residual_pictures, residual_text
+from afm_scan_ros.report.sentences import sentence
 from afm_scan_ros.report.table import Part, Rows
 
-SHARES = (
-    "The share of an effect is the part of the held-out mean square that returns when it alone is"
-    " left out. The other effects keep their fitted values. Shares of several effects need not sum"
-    " to 100 %."
-)
-METHOD = (
-    "The residual is measured minus predicted displacement under the recorded drive, each without"
-    " its mean. The detection limit of a band is sensor noise plus model discrepancy, which scales"
-    " with the record's motion. The likelihood of a residual is Student's t distribution in each"
-    " band. The probability of a set of effects follows from its evidence over all data, by"
-    " Laplace's method. An effect is named where its probability is 95 % or more and no band lacks"
-    " anything. Residuals in nm are of held-out stretches: the values are then fitted to the other"
-    " stretches. Intervals are 95 % intervals."
-)
 RECORDS = ("record", "samples", "sample period", "x at the start", "y at the start")
 
 
@@ -69,7 +55,7 @@ def diagnosis_report(found: ResidualReport, of: Provenance) -> ReportPage:
             *_effect_sections(diagnosis),
             *residuals,
             Section("Records", [Rows(RECORDS, list(_records(found)))]),
-            Section("Method", [METHOD]),
+            Section("Method", [sentence("diagnosis.method")]),
         ],
         warnings=of.shortcomings,
         provenance=of,
@@ -78,20 +64,17 @@ def diagnosis_report(found: ResidualReport, of: Provenance) -> ReportPage:
 
 def _change(found: ScannerDiagnosis | CoupledDiagnosis) -> Iterator[str]:
     """Say in a sentence what the effects found explain of the residual."""
-    figures = found.rms_before, found.rms_after, found.noise_floor
-    each = [
-        "{}: {} nm with the model, {} nm with the extended model, detection limit {} nm".format(
-            axis, *(nanometres(of[axis]) for of in figures)
-        )
-        for axis in found.noise_floor
-    ]
+    each = []
+    for axis, limit in found.noise_floor.items():
+        figures = {"before": found.rms_before[axis], "after": found.rms_after[axis], "limit": limit}
+        each.append(sentence("residual.change", axis=axis, **figures))
     yield f"Residual, rms: {'; '.join(each)}."
 
 
 def _effect_sections(found: ScannerDiagnosis) -> Iterator[Section]:
     evidence = list(_effects(found))
     if evidence:
-        yield Section("Evidence for the effects", [*evidence, SHARES])
+        yield Section("Evidence for the effects", [*evidence, sentence("diagnosis.shares")])
     alternatives = text.alternative_rows(found)
     if alternatives:
         yield Section("Alternatives", [Rows(text.TRIED, alternatives)])
@@ -114,12 +97,11 @@ def _pictures(found: ResidualReport, diagnosed: AxisDiagnosis) -> tuple[Picture,
 
 
 def _effects(found: ScannerDiagnosis) -> Iterator[str]:
-    """Yield the equation of each effect and the evidence for it."""
     for effect in found.effects:
         yield text.form_text(effect)
         yield " ".join((text.share_text(effect), *text.evidence_text(effect)))
     if any(effect.periodic for effect in found.effects):
-        yield CONVENTION
+        yield sentence("diagnosis.convention")
 
 
 def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
@@ -128,7 +110,7 @@ def _residual(found: ResidualReport, axis: str) -> Iterator[str]:
     if diagnosed.final is not diagnosed.chain:
         record = most_excited_record(diagnosed)
         after, limit = found.after[axis][record], diagnosed.evidence[record].limit
-        yield f"With the extended model: {' '.join(residual_text(after, limit))}"
+        yield sentence("residual.extended", said=residual_text(after, limit))
 
 
 def write_diagnosis(
@@ -146,21 +128,20 @@ def write_diagnosis(
 
 COUPLED_ROWS = ("effect", "probability", "share of the residual's\nmean square, %")
 RESIDUALS = ("axis", "residual, model,\nrms in nm", "with the effects", "detection\nlimit")
-HELD_OUT = "Residuals are rms of the last record of each amplitude, which no fit saw."
 
 
 def coupled_result(found: CoupledDiagnosis) -> Iterator[Part]:
     """Yield verdict, effects, probabilities and residuals."""
-    yield text.VERDICTS[found.verdict]
+    yield sentence(f"verdict.{found.verdict}")
     if found.effects:
         shares = [(e, significant(100.0 * e.explained_fraction)) for e in found.effects]
-        named = [(e.name, text.probability_text(e.probability), share) for e, share in shares]
+        named = [(e.name, probability(e.probability), share) for e, share in shares]
         yield Rows(COUPLED_ROWS, named)
     yield from text.probabilities(found)
     figures = found.rms_before, found.rms_after, found.noise_floor
     left = [(axis, *(nanometres(of[axis]) for of in figures)) for axis in found.base.axes]
     yield Rows(RESIDUALS, left)
-    yield HELD_OUT
+    yield sentence("residual.of_last_records")
 
 
 def next_coupled_record(found: CoupledDiagnosis) -> str | None:
@@ -171,7 +152,7 @@ def next_coupled_record(found: CoupledDiagnosis) -> str | None:
     names = {name for names in sets if names != OUTSIDE for name in names}
     needs = {e.needs for e in COUPLED_EFFECTS if e.feedback and e.name in names}
     wanted = "; ".join(sorted(needs)) or "steady periods at further amplitudes"
-    return f"Record more realisations, and diagnose them together with these: {wanted}."
+    return sentence("next.realisations", wanted=wanted)
 
 
 def coupled_next_steps(found: CoupledDiagnosis) -> Iterator[str]:
@@ -179,12 +160,10 @@ def coupled_next_steps(found: CoupledDiagnosis) -> Iterator[str]:
     if said := next_coupled_record(found):
         yield said
     elif found.verdict == SUFFICIENT:
-        yield "Nothing above the detection limit: use this model."
+        yield sentence("next.coupled_sufficient")
     else:
-        yield "Use model.extended.yaml in place of the model."
-    for effect in (e for e in COUPLED_EFFECTS if e.name in found.selected):
-        advice = effect.advice[0].upper() + effect.advice[1:]
-        yield f"{effect.name}. {text.LIMITS[effect.remedy]}. {advice}."
+        yield sentence("next.coupled_extended")
+    yield from (text.remedy_text(e) for e in COUPLED_EFFECTS if e.name in found.selected)
 
 
 def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Provenance) -> None:
@@ -192,13 +171,6 @@ def write_coupled(folder: Path, found: CoupledDiagnosis, heading: str, of: Prove
     save_diagnosis(folder / "diagnosis.json", {**coupled_document(found), "provenance": plain(of)})
     save_coupled(folder / "model.extended.yaml", found.model, f"{heading}\n{heading_lines(of)}")
     coupled_report(found, of).write(folder / "report.html", None)
-
-
-COUPLED_METHOD = (
-    "Each set of effects is fitted with the structure to all records but the last of each"
-    " amplitude. Its simulation of these is compared with them. The likelihood of what it leaves is"
-    " Student's t distribution in each band, of noise and the error that the model states."
-)
 
 
 def coupled_report(found: CoupledDiagnosis, of: Provenance) -> ReportPage:
@@ -212,7 +184,7 @@ def coupled_report(found: CoupledDiagnosis, of: Provenance) -> ReportPage:
         evidence=[
             Section("Effects, probabilities and residuals", rest),
             Section("Alternatives", [Rows(text.TRIED, _alternatives(found))]),
-            Section("Method", [COUPLED_METHOD]),
+            Section("Method", [sentence("diagnosis.coupled_method")]),
         ],
         warnings=of.shortcomings,
         provenance=of,
@@ -253,7 +225,6 @@ def coupled_document(found: CoupledDiagnosis) -> dict[str, Any]:
 
 def _effect(effect: IdentifiedEffect) -> dict[str, Any]:
     of = effect.evidence
-    before, after = (significant(1e9 * rms) for rms in (of.rms_without, of.rms_with))
     return {
         "name": effect.name,
         "axis": effect.axis,
@@ -264,15 +235,15 @@ def _effect(effect: IdentifiedEffect) -> dict[str, Any]:
         "probability": effect.probability,
         "explained_fraction": effect.explained_fraction,
         "evidence": [
-            f"Of records that no fit saw {before} nm rms is left without it, {after} nm with it.",
-            f"The log likelihood with it exceeds that without it by {significant(of.nats)} nats.",
-            f"The largest remaining band is {significant(of.largest_ratio, 2)} times its limit.",
+            sentence("evidence.unseen", of=of),
+            sentence("evidence.likelihood", of=of),
+            sentence("evidence.largest_band", of=of),
         ],
     }
 
 
 def _alternatives(found: CoupledDiagnosis) -> list[tuple[str, ...]]:
     return [
-        (other.name, other.axis, text.probability_text(other.probability), text.why_not_text(other))
+        (other.name, other.axis, probability(other.probability), text.why_not_text(other))
         for other in found.alternatives
     ]

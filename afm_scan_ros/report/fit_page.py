@@ -1,20 +1,19 @@
-"""The fit report as a page: what was fitted on what, how well, and pictures of it."""
+"""The fit report: what was fitted on what, how well, as a page and as JSON, ``MODEL.fit.json``."""
 
 from collections.abc import Callable, Iterator
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from attrs import asdict
 
 from afm_scan_ros.core.effects.vibration import held
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, FittedRecord
-from afm_scan_ros.core.identification.identify import Identification
-from afm_scan_ros.core.identification.local_response import Complex
+from afm_scan_ros.core.identification.findings import Finding
+from afm_scan_ros.core.identification.identify import FittedAxis, FittedRecord, Identification
 from afm_scan_ros.core.identification.records.recording import Misfit
-from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy
-from afm_scan_ros.core.types import Array
-from afm_scan_ros.report.effect_status_text import intervals_text, status_text
-from afm_scan_ros.report.fit_summary import finding_text
+from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, Status
+from afm_scan_ros.core.types import Array, Complex
 from afm_scan_ros.report.page import CommandLine, Part, ReportPage, Section
 from afm_scan_ros.report.picture import (
     BLUE,
@@ -31,21 +30,64 @@ from afm_scan_ros.report.picture import (
     Picture,
     Steps,
 )
+from afm_scan_ros.report.sentences import intervals_text, sentence, status_text
 from afm_scan_ros.report.table import Rows
+
+
+def finding_text(finding: Finding) -> str:
+    """Say what was found and what to do about it."""
+    return sentence(f"finding.{type(finding).__name__}", of=finding)
+
+
+def fit_summary(identification: Identification) -> dict[str, Any]:
+    """Return the fit report by axis: what was fitted, figures of merit, warnings.
+
+    Misfits are those of the paper's Eqs. 2 and 3 (creep and vibration with hysteresis, m), and of
+    its Eqs. 18 and 19 (direct inverse, V). Intervals are of 95 %.
+    """
+    return {name: _axis(axis) for name, axis in identification.axes.items()}
+
+
+def _axis(found: FittedAxis) -> dict[str, Any]:
+    model = found.model
+    return {
+        "records": {one.name: _misfit(one.misfit, "m") for one in found.records},
+        "held_out": {one.record: _misfit(one.misfit, "m") for one in found.validations},
+        "operator": found.operator,
+        "output_map": model.hysteresis.output is not None,
+        "direct_inverse": _misfit(found.direct, "v"),
+        "creep": {"gains": model.creep.gains, "time_constants_s": model.creep.time_constants},
+        "sensor": model.sensor and asdict(model.sensor),
+        "discrepancy_over_motion": found.discrepancy,
+        "scan_deviation_over_range": found.deviation,
+        "effects": asdict(model.effects, value_serializer=_plain),
+        "model_discrepancy": [_model_discrepancy(o.model_discrepancy) for o in found.validations],
+        "warnings": [finding_text(finding) for finding in found.warnings],
+    }
+
+
+def _plain(_owner: Any, _field: Any, value: Any) -> Any:  # noqa: ANN401 - attrs' own
+    return value.value if isinstance(value, Status) else value
+
+
+def _model_discrepancy(known: ModelDiscrepancy) -> dict[str, Any]:
+    return {
+        "record": known.record,
+        "bands_hz": known.bands,
+        "rms_m": known.rms,
+        "noise_rms_m": known.noise,
+        "displacement_rms_m": known.displacement,
+    }
+
+
+def _misfit(misfit: Misfit, unit: str) -> dict[str, float]:
+    return {f"sigma_{unit}": misfit.sigma, f"max_{unit}": misfit.maximum, "samples": misfit.samples}
+
 
 KNOWN = ("", "known, and where it holds", "95 % intervals")
 LEFT = ("measured less model", "sigma, nm", "max, nm", "samples")
 DIRECT = ("drive of the inverse less that of the records", "sigma, mV", "max, mV", "samples")
 DISCREPANCY = ("band, Hz", "discrepancy, nm rms", "noise, nm rms", "discrepancy / motion")
-MERITS = (
-    "Sigma is the standard deviation of the error about zero, with N - 1 (the paper's Eqs. 2 and"
-    " 18). Max is its largest magnitude (Eqs. 3 and 19)."
-)
-METHOD = (
-    "Model discrepancy is measured minus predicted displacement of a held-out record, without"
-    " sensor noise. The noise is estimated at rest before the first move, and is taken as white."
-    " Both together are the detection limit of a later diagnosis."
-)
 
 
 def fit_report(found: Identification, model: Path) -> ReportPage:
@@ -67,55 +109,35 @@ def fit_report(found: Identification, model: Path) -> ReportPage:
             Section("Fit and prediction of each record", list(_fits(found))),
             Section("Response and vibration", [fit_picture(found, "response")]),
             Section("Creep and hysteresis", [fit_picture(found, "slow")]),
-            Section("Model discrepancy", [METHOD, *_discrepancies(found)]),
+            Section("Model discrepancy", [sentence("fit.method"), *_discrepancies(found)]),
         ],
     )
 
 
 def _answer(found: Identification) -> Iterator[str]:
-    shares = [f"{100 * a.deviation:.2g} % in {name}" for name, a in found.axes.items()]
-    yield (
-        "The model predicts the displacement of a scan over the whole drive to"
-        f" {' and '.join(shares)} of its range (one standard deviation)."
-    )
-    left = [
-        f"{NANO * one.misfit.sigma:.3g} nm in {name}"
-        for name, axis in found.axes.items()
-        for one in axis.validations[:1]
-    ]
-    if left:
-        yield f"Of a record that was not fitted it leaves {' and '.join(left)} rms."
-    else:
-        yield "No record was held out of the fit, so its error in another record is not known."
+    shares = {name: axis.deviation for name, axis in found.axes.items()}
+    yield sentence("fit.prediction", shares=shares)
+    left = {n: one.misfit.sigma for n, axis in found.axes.items() for one in axis.validations[:1]}
+    yield sentence("fit.held_out" if left else "fit.none_held_out", left=left)
 
 
 def _next(model: Path) -> Iterator[CommandLine]:
     bag, diagnosis = (model.with_name(f"{model.stem}_{name}") for name in ("scan", "diagnosis"))
-    yield CommandLine(
-        "Scan with the model's inverse. Name your scanner with --scanner, or else the simulated one"
-        " is scanned.",
-        ["scan", "--model", model, "--bag", bag],
-    )
-    yield CommandLine(
-        "Ask now and then whether the scanner still is what the model says.",
-        ["diagnose", bag, "--model", model, "--out", diagnosis],
-    )
+    scan = ["scan", "--model", model, "--bag", bag]
+    yield CommandLine(sentence("fit.scan"), scan)
+    diagnose = ["diagnose", bag, "--model", model, "--out", diagnosis]
+    yield CommandLine(sentence("fit.diagnose"), diagnose)
 
 
 def _fits(found: Identification) -> Iterator[Part]:
-    yield MERITS
+    yield sentence("fit.merits")
     for name, axis in found.axes.items():
-        yield f"The hysteresis of {name} is of {axis.operator}."
-        yield Rows(LEFT, list(_merits(axis)), f"Axis {name}")
+        yield sentence("fit.operator", name=name, operator=axis.operator)
+        fitted = [_merit(f"{each.name}, fitted", each.misfit, NANO) for each in axis.records]
+        held_out = [_merit(f"{e.record}, held out", e.misfit, NANO) for e in axis.validations]
+        yield Rows(LEFT, [*fitted, *held_out], f"Axis {name}")
         direct = _merit("direct inverse of the hysteresis", axis.direct, MILLI)
         yield Rows(DIRECT, [direct])
-
-
-def _merits(axis: FittedAxis) -> Iterator[tuple[str, ...]]:
-    for record in axis.records:
-        yield _merit(f"{record.name}, fitted", record.misfit, NANO)
-    for one in axis.validations:
-        yield _merit(f"{one.record}, held out", one.misfit, NANO)
 
 
 def _merit(name: str, of: Misfit, scale: float) -> tuple[str, ...]:
@@ -231,17 +253,10 @@ def _bands(name: str, found: FittedAxis) -> Panel:
     return Panel(steps, HERTZ, "rms in nm", f"{name}: {which}, rms by band", "xy")
 
 
-CAPTIONS = {
-    "fit": "Left: rms by band of the motion of a record, if there is one that was not fitted, and"
-    " of what the model leaves of it. Right: what the model leaves of each record.",
-    "response": "Response of the displacement to F = H(u), creep and the converter's hold included:"
-    " by local fits to each record, and of the model.",
-    "slow": "Creep of the model after a step, and the loops F = H(u) of the records.",
-}
 PANELS = {"fit": (_bands, _left), "response": (_magnitude, _phase), "slow": (_creep, _loops)}
 
 
 def fit_picture(found: Identification, name: str) -> Picture:
     """Return the picture of a name among ``PANELS``, with a row for each axis."""
     rows = [[draw(axis, of) for draw in PANELS[name]] for axis, of in found.axes.items()]
-    return Picture(name, CAPTIONS[name], rows)
+    return Picture(name, sentence(f"caption.{name}"), rows)

@@ -125,7 +125,6 @@ class _Drawing:
             plots["bands"].js_on_event(Tap, CustomJS(args=args, code=PICK_BAND))
 
     def _plot(self, panel: Panel) -> Plot:
-        """Draw a panel."""
         plot = figure(
             x_axis_label=None if panel.dates else panel.x,
             y_axis_label=panel.y,
@@ -235,7 +234,6 @@ def _single(values: Any) -> Any:  # noqa: ANN401 - dates too
 
 
 def _draw(mark: Mark, plot: Plot, source: ColumnDataSource) -> None:
-    """Draw a mark on a figure."""
     if isinstance(mark, Map):
         _draw_map(mark, plot, source)
         return

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from attrs import frozen
 
-from afm_scan_ros.core.diagnosis.result import Value
+if TYPE_CHECKING:  # result imports every effect, which takes seconds
+    from afm_scan_ros.core.diagnosis.result import Value
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -34,6 +36,17 @@ def nanometres(value: float) -> str:
 def percent(share: float) -> str:
     """Return a share of the range in percent."""
     return f"{100.0 * share:.3f}"
+
+
+SMALLEST = 1e-3
+"""Smallest probability that is written."""
+
+
+def probability(value: float) -> str:
+    """Write a probability with three decimals; a dash where there is none."""
+    if math.isnan(value):
+        return "-"
+    return "< 0.001" if value < SMALLEST else f"{value:.3f}"
 
 
 def quantity(value: float, halfwidth: float, unit: str) -> str:
@@ -93,7 +106,7 @@ def _raised(unit: str) -> str:
 EDGE = "the edge of the catalogue's range"
 
 
-def value_text(of: Value) -> str:
+def value_text(of: "Value") -> str:
     """Return value and interval, as ``57.1 ± 1.6 µs``.
 
     Where the catalogue's range cuts the interval, its ends are given as the JSON has them.
@@ -110,10 +123,6 @@ def value_text(of: Value) -> str:
 
 SIGNIFICANT = 5.99 / 1.96**2
 """χ² of cosine and sine together by which 95 % exceed zero, in units of their 95 % intervals."""
-CONVENTION = (
-    "Amplitude and phase are those of amplitude cos(2 pi n frequency t - phase), with n the"
-    " harmonic. They are those of the first record. The JSON file has cosines and sines."
-)
 
 
 @frozen
@@ -121,8 +130,8 @@ class Harmonic:
     """Number, and the cosine and sine of one harmonic."""
 
     number: int
-    cosine: Value
-    sine: Value
+    cosine: "Value"
+    sine: "Value"
 
     @property
     def significant(self) -> bool:
@@ -146,7 +155,7 @@ class Harmonic:
         yield f"phase{which}", quantity(phase, math.degrees(across), "°")
 
 
-def harmonic_rows(values: Sequence[Value]) -> Iterator[tuple[str, str]]:
+def harmonic_rows(values: "Sequence[Value]") -> Iterator[tuple[str, str]]:
     """Yield a disturbance's frequency and harmonics, those that are not significant in one row."""
     named = {v.parameter.name: v for v in values}
     frequency = named.pop("frequency")

@@ -112,6 +112,5 @@ def block_peaks(values: Array, finest: int) -> Array:
 
 
 def _starts(count: int, finest: int) -> NDArray[np.intp]:
-    """Return where blocks begin."""
     starts: NDArray[np.intp] = np.linspace(0, count, min(count, finest) + 1).astype(np.intp)[:-1]
     return starts

@@ -26,6 +26,7 @@ from afm_scan_ros.report.picture import (
     Steps,
 )
 from afm_scan_ros.report.quantity import nanometres, significant
+from afm_scan_ros.report.sentences import sentence
 
 LARGE = 0.3
 """Share from which a dependence or a coherence is stated."""
@@ -35,14 +36,7 @@ CHANCE = 0.05
 """Share of white noise's autocorrelation that lies outside its 95 % band."""
 NEAR_LIMIT = 0.95
 """Share of the identified drive range from which on an excursion saturates."""
-PATTERN = (
-    "A residual at its detection limit may do so too, because model discrepancy is not white noise."
-)
 UNLIKE_LINES = {"speed", "amplitude", "time"}
-CONFOUNDED = (
-    " The preparation of a scan differs from its lines in speed, amplitude and time at once, so"
-    " these cannot be separated."
-)
 """What depends on one of these may depend on another of them."""
 
 QUANTITIES = {
@@ -57,20 +51,18 @@ QUANTITIES = {
 def residual_text(one: Description, limit: DetectionLimit) -> Iterator[str]:
     """Yield what is known of a residual, its size first."""
     yield _size(one, limit)
-    yield from _repeats(one)
-    yield from _sides(one)
+    if one.repeats:
+        yield sentence("residual.repeats", of=one.repeats)
+    if one.sides is not None:
+        yield sentence("residual.sides", of=one.sides, ratio=RULES)
     yield from _dependences(one)
     yield from _coherences(one, limit)
     if one.lines:
-        lines = ", ".join(f"{line:.4g} Hz ({nanometres(size)} nm rms)" for line, size in one.lines)
-        yield f"Spectral lines over the whole record: {lines}."
-    yield (
-        f"{one.own.outside_white:.0%} of its autocorrelation lies outside the 95 % band of white"
-        f" noise. At long lags {one.own.outside_bootstrap:.0%} lies outside the 95 % band of a"
-        " block bootstrap."
-    )
+        lines = [f"{line:.4g} Hz ({nanometres(size)} nm rms)" for line, size in one.lines]
+        yield sentence("residual.lines", lines=lines)
+    yield sentence("residual.autocorrelation", of=one.own)
     if one.own.outside_white > CHANCE:
-        yield PATTERN
+        yield sentence("residual.pattern")
 
 
 def chosen_text(diagnosed: AxisDiagnosis) -> str:
@@ -80,12 +72,8 @@ def chosen_text(diagnosed: AxisDiagnosis) -> str:
     peaks = [significant(float(ratio.max()), 2) for ratio in diagnosed.ratio_before]
     names = [evidence.playback.view.name for evidence in diagnosed.evidence]
     chosen = most_excited_record(diagnosed)
-    others = (f"{peaks[i]} in {name}" for i, name in enumerate(names) if i != chosen)
-    return (
-        f"This is {names[chosen]}, the record that exceeds its detection limit most:"
-        f" {peaks[chosen]} times in its largest band, {', '.join(others)}."
-        " The JSON file describes each record. "
-    )
+    others = [f"{peaks[i]} in {name}" for i, name in enumerate(names) if i != chosen]
+    return sentence("residual.chosen", name=names[chosen], peak=peaks[chosen], others=others) + " "
 
 
 def initial_state_text(one: Description) -> str:
@@ -104,45 +92,17 @@ def _size(one: Description, limit: DetectionLimit) -> str:
     ratio = one.bands / limit.rms
     largest = int(np.argmax(ratio))
     low, high = limit.edges[largest], limit.edges[largest + 1]
-    return (
-        f"{nanometres(one.rms)} nm rms over the whole record, with a detection limit of"
-        f" {nanometres(limit.total)} nm rms. Its largest band is {low:g} to {high:g} Hz,"
-        f" {significant(ratio[largest], 2)} times the limit there."
-    )
-
-
-def _repeats(one: Description) -> Iterator[str]:
-    if one.repeats:
-        yield (
-            f"On the lines {one.repeats.to_scan:.0%} of its mean square repeats from line to line."
-            f" {one.repeats.to_time:.0%} shifts whole lines over time. {one.repeats.rest:.0%} does"
-            " neither."
-        )
-
-
-def _sides(one: Description) -> Iterator[str]:
-    if one.sides is None:
-        return
-    equivalent, unlike = one.sides.equivalent, one.sides.unlike
-    ruled = "on position and direction alike"
-    if equivalent > RULES * unlike:
-        ruled = "on position"
-    elif unlike > RULES * equivalent:
-        ruled = "on direction"
-    yield (
-        f"Trace and retrace share {nanometres(equivalent)} nm rms and differ from it by"
-        f" {nanometres(unlike)} nm rms, so it depends {ruled}."
-    )
+    sizes = {"rms": one.rms, "limit": limit.total, "ratio": ratio[largest]}
+    return sentence("residual.size", low=low, high=high, **sizes)
 
 
 def _dependences(one: Description) -> Iterator[str]:
     shares = {name: each.share for name, each in one.dependences.items()}
     large = sorted((n for n in shares if shares[n] > LARGE), key=shares.__getitem__, reverse=True)
-    if not large:
-        return
-    listed = ", ".join(f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in large)
-    mixed = CONFOUNDED if one.repeats and UNLIKE_LINES.intersection(large) else ""
-    yield f"Share of its mean square that one quantity alone explains: {listed}.{mixed}"
+    if large:
+        listed = [f"{QUANTITIES[name]} ({shares[name]:.0%})" for name in large]
+        confounded = one.repeats and UNLIKE_LINES.intersection(large)
+        yield sentence("residual.dependences", shares=listed, confounded=confounded)
 
 
 def _coherences(one: Description, limit: DetectionLimit) -> Iterator[str]:
@@ -152,9 +112,10 @@ def _coherences(one: Description, limit: DetectionLimit) -> Iterator[str]:
         best = int(np.argmax(values))
         if values[best] > max(LARGE, each.chance):
             low, high = limit.edges[best], limit.edges[best + 1]
-            found.append(f"the {name} ({values[best]:.2f}, {low:g} to {high:g} Hz)")
+            figures = {"value": values[best], "low": low, "high": high}
+            found.append(sentence("residual.coherence", name=name, **figures))
     if found:
-        yield f"It is coherent with {', '.join(found)}."
+        yield sentence("residual.coherences", found=found)
 
 
 LAGS, LONGEST = 80, 16
@@ -186,7 +147,7 @@ def residual_pictures(
     record, seen = stages[0].record, "frequency of the spectrum in Hz"
     first = Picture(
         f"residual_{axis}",
-        f"The residual in {axis} of {record}. Tap a band to see its spectrum.",
+        sentence("caption.residual", axis=axis, record=record),
         (
             [
                 Panel(bands, HERTZ, "rms by band in nm", log="xy", role="bands"),
@@ -197,9 +158,7 @@ def residual_pictures(
     )
     second = Picture(
         f"dependence_{axis}",
-        f"The residual in {axis} of {record}: by position and speed, mean ± standard deviation; the"
-        " mean line, or by travel where the record has no lines; and its autocorrelation, as its"
-        " range in each interval of lag.",
+        sentence("caption.dependence", axis=axis, record=record),
         (
             [_dependence(quantity, named) for quantity in ("position", "speed")],
             [_lines(named), _correlation_panel(named)],

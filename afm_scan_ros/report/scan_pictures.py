@@ -35,6 +35,7 @@ from afm_scan_ros.report.picture import (
     picked_lines,
 )
 from afm_scan_ros.report.quantity import nanometres
+from afm_scan_ros.report.sentences import sentence
 from afm_scan_ros.simulation.sample import Grating
 
 WITHOUT, WITH = "without compensation", "with compensation"
@@ -121,10 +122,7 @@ def tracking_picture(view: ScanExcerpt, title: str = "") -> Picture:
         else _in_plane(view, achieved)
     )
     driven = [_drive(view, view.drive)] if view.drive else []
-    caption = (
-        f"{SHOWN} lines after the first: desired and {achieved} displacement, their difference, and"
-        " the drive, over one time. Drag a box to zoom in; the panels over time zoom together."
-    )
+    caption = sentence("caption.tracking", count=SHOWN, achieved=achieved)
     return Picture("lines", caption, (*rows, (*driven, beside)), LOW, title=title)
 
 
@@ -137,7 +135,7 @@ def comparison_picture(
         _against_position(without, (ORANGE, LIGHT_ORANGE), WITHOUT),
         _against_position(compensated, (BLUE, LIGHT_BLUE), WITH),
     ]
-    caption = f"{SHOWN} lines, {WITHOUT} and {WITH}. The panels over time zoom together."
+    caption = sentence("caption.compared", count=SHOWN, without=WITHOUT, compensated=WITH)
     return Picture(name, caption, (*_over_time(pair, {}), beside), LOW, title=title)
 
 
@@ -164,7 +162,6 @@ def _over_time(
 
 
 def _drive(view: ScanExcerpt, drive: Trace) -> Panel:
-    """Show the drives of both axes."""
     curves = [
         Curve(view.milliseconds, drive.axis(axis), axis, colour)
         for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)
@@ -265,9 +262,8 @@ def error_picture(name: str, scans: TwoScans) -> Picture:
             )
         ]
         panels.append([Panel(curves, TIME, f"{axis} error in nm", level=0.0)])
-    return Picture(
-        name, f"{scans.displacement.capitalize()} error of {SHOWN} lines of the same scan.", panels
-    )
+    kind = scans.displacement.capitalize()
+    return Picture(name, sentence("caption.errors", kind=kind, count=SHOWN), panels)
 
 
 def image_picture(name: str, images: Images, how: str) -> Picture:
@@ -294,12 +290,8 @@ def image_picture(name: str, images: Images, how: str) -> Picture:
         image_row(off, [f"height error {name}" for name in images.names], x, y),
     )
     pairs = zip(images.errors, images.names, strict=True)
-    errors = " and ".join(f"{nanometres(error)} nm rms {name}" for error, name in pairs)
-    caption = (
-        f"A simulated grating of 16 µm pitch and 100 nm height, scanned {how}. Each height is drawn"
-        f" at the desired position. The height error is {errors}. Tap an image to see the line"
-        " there."
-    )
+    errors = [f"{nanometres(error)} nm rms {name}" for error, name in pairs]
+    caption = sentence("caption.image", how=how, errors=errors)
     return Picture(name, caption, rows)
 
 

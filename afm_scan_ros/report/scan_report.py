@@ -14,15 +14,9 @@ from afm_scan_ros.report.page import CommandLine, ReportPage, Section
 from afm_scan_ros.report.picture import MICRO, Picture
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import Images, image_picture, tracking_picture, view_of
+from afm_scan_ros.report.sentences import sentence
 from afm_scan_ros.report.table import Row, Rows, Table
 from afm_scan_ros.report.whole_scan import whole_pictures
-
-METHOD = (
-    "The error is achieved minus desired displacement at the same sample. No delay, gain or offset"
-    " is fitted. Its rms is about zero. Percentages are of the planned range of the axis, which the"
-    " scan's specification states, however much of the scan is there. The first line, the approach"
-    " and the preparation are not part of 'all'."
-)
 
 
 def scan_report(analysis: Analysis, recording: ScanRecording) -> ReportPage:
@@ -33,7 +27,10 @@ def scan_report(analysis: Analysis, recording: ScanRecording) -> ReportPage:
         picture=tracking_picture(view_of(recording)),
         next_steps=list(_next(analysis)),
         evidence=[
-            Section("Errors of each part of the scan", [*error_tables(analysis), METHOD]),
+            Section(
+                "Errors of each part of the scan",
+                [*error_tables(analysis), sentence("scan.method")],
+            ),
             Section("The whole scan", list(whole_pictures(recording))),
             Section("What was scanned", [Rows((), scan_rows(analysis))]),
         ],
@@ -47,33 +44,23 @@ def _answer(analysis: Analysis) -> Iterator[str]:
     x, y = tracking.x, tracking.y
     named = {"x at constant speed": (x, x.constant_speed), "y on trace": (y, y.trace)}
     errors = [
-        f"{nanometres(error.rms)} nm rms in {name} ({percent(error.rms_share)} % of the planned"
-        f" {MICRO * axis.planned_range:g} µm)"
+        sentence("scan.error_of", name=name, error=error, range=axis.planned_range)
         for name, (axis, error) in named.items()
         if error is not None
     ]
     if errors:
-        yield f"The {tracking.displacement} tracking error is {' and '.join(errors)}."
+        yield sentence("scan.error", kind=tracking.displacement, errors=errors)
     used = analysis.scan.inverses
-    if used:
-        yield f"The scan was made with the inverse of {', '.join(used)}."
-    else:
-        yield "The scan was made without compensation: each axis had one constant gain."
+    yield sentence("scan.compensated" if used else "scan.uncompensated", inverses=used)
 
 
 def _next(analysis: Analysis) -> Iterator[str | CommandLine]:
     """Yield what to do; a bag states neither the file of its scan nor that of its model."""
     if analysis.shortcomings:
-        yield "Make the whole scan again: 'afm-scan scan' with the same files, into a new bag."
-    yield CommandLine(
-        "Find out what the model lacks, where the error is larger than you can accept. Add the file"
-        " of the scanner's model as --model.",
-        ["diagnose", analysis.bag, "--out", f"{analysis.name}_diagnosis"],
-    )
-    yield (
-        "Repeat the same scan and learn what repeats of its error: 'afm-scan learn' with the files"
-        " of this scan and of its model as --spec and --model."
-    )
+        yield sentence("scan.repeat")
+    words = ["diagnose", analysis.bag, "--out", f"{analysis.name}_diagnosis"]
+    yield CommandLine(sentence("scan.diagnose"), words)
+    yield sentence("scan.learn")
 
 
 HEADINGS = ("error", "rms, nm", "rms, %", "peak, nm", "peak, %")
@@ -214,16 +201,6 @@ def contributions(done: Scanned, line_rate: float) -> Table:
     return Table("contributions", title, columns, rows)
 
 
-DEMO_METHOD = (
-    "A simulated scanner moves over 40 µm by 40 µm. The model that is inverted was identified from"
-    " simulated records, so it is not exact. Each scan ran {}, and is recorded in a bag. The error"
-    " is achieved minus desired displacement, in percent of the range. Nothing is fitted. Only"
-    " 'measured' errors contain sensor noise. Without compensation each axis has one constant gain."
-    " Errors in x are those of the constant-speed part. Errors in y are those on trace, except"
-    " those over its step."
-)
-
-
 def demo_report(
     tables: Sequence[Table],
     compared: Mapping[float, Picture],
@@ -233,12 +210,9 @@ def demo_report(
 ) -> ReportPage:
     """Return the report on the demonstration; ``ran`` says how the scans ran."""
     scan, images = imaged
-    without, compensated = (nanometres(error) for error in images.errors)
+    without, compensated = images.errors
     how = f"at {scan.line_rate:g} Hz with {scan.lines} lines"
-    wrong = (
-        f"The image of a grating is wrong by {without} nm rms without compensation, and by"
-        f" {compensated} nm with it."
-    )
+    wrong = sentence("demo.image", without=without, compensated=compensated)
     return ReportPage(
         title="A piezoscanner without and with compensation",
         answer=[_improvement(tables[0]), wrong],
@@ -250,7 +224,7 @@ def demo_report(
                 [table.text() for table in tables],
             ),
             Section("Displacement and error of x and y", list(compared.values())),
-            Section("Method", [DEMO_METHOD.format(ran)]),
+            Section("Method", [sentence("demo.method", ran=ran)]),
         ],
     )
 
@@ -259,11 +233,8 @@ def _improvement(tracked: Table) -> str:
     """Say the error of x without and with all inverses, at each line rate."""
     errors = {(row["line_rate_hz"], row["inverses"]): row["x_rms"] for row in tracked.rows}
     rates = sorted({float(rate) for rate, _ in errors})
-    each = [
-        f"from {errors[rate, 'none']:.2f} % to {errors[rate, 'all']:.3f} % at {rate:g} Hz"
-        for rate in rates
-    ]
-    return f"Inverting the model lowers the x error (rms, of the range) {', '.join(each)}."
+    pairs = {rate: (errors[rate, "none"], errors[rate, "all"]) for rate in rates}
+    return sentence("demo.improvement", errors=pairs)
 
 
 def _demo_row(case: DemoScan, analysis: Analysis) -> dict[str, float | str]:

@@ -28,6 +28,7 @@ from afm_scan_ros.report.picture import (
 )
 from afm_scan_ros.report.reduction import DRAWING, extremes, thinned
 from afm_scan_ros.report.scan_pictures import LOW, WAYS, topics_shown
+from afm_scan_ros.report.sentences import sentence
 
 TIME = "time in s"
 
@@ -90,11 +91,7 @@ def _course(signals: Signals) -> Picture:
             for axis, colour in zip(AXES, (BLUE, ORANGE), strict=True)
         ]
         rows.append([Panel(drives, TIME, "drive in V")])
-    caption = (
-        "The whole scan, preparation and approach included. Of each stretch the lowest and the"
-        " highest sample are drawn, so that no peak is missing."
-    )
-    return Picture("whole", caption, rows, LOW)
+    return Picture("whole", sentence("caption.whole"), rows, LOW)
 
 
 @define(eq=False)
@@ -126,11 +123,7 @@ class _ErrorImager:
             Panel(picked_lines(maps[axis], WAYS), x, f"{axis} error in nm", level=0.0)
             for axis in AXES
         ]
-        caption = (
-            "The error by line and place. Tap an image to see the errors of the line there. Where a"
-            " scan has more lines than the image has rows, a row shows the largest of their errors."
-        )
-        return Picture("by_line", caption, (images, lines))
+        return Picture("by_line", sentence("caption.by_line"), (images, lines))
 
     def _maps(self, axis: str) -> list[Map]:
         """Return the error on trace and on retrace, in the same colours."""

@@ -8,7 +8,7 @@ from attrs import frozen
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from afm_scan_ros.report.style import styled
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.table import Cell, Columns, Row
 
 

@@ -3,7 +3,6 @@
 from attrs import evolve
 
 from afm_scan_ros.core.identification.drives.excitation import PLANS, Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import checked
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Trace
@@ -16,7 +15,7 @@ def calibrate_in_process(plant: PlantSpec, seed: int) -> dict[str, Record]:
     return {name: evolve(record(plan, plant, seed), kind=name) for name, plan in plans.items()}
 
 
-def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
+def record(plan: Plan, plant: PlantSpec, seed: int) -> Record:
     """Drive a scanner fresh from rest through one plan.
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
@@ -25,7 +24,7 @@ def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
     return checked(Record.of_traces(plan.name, drive, measured, start="depolarised"))
 
 
-def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
+def drive_through(plan: Plan, plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
     """Drive (V) and measured displacement (m) of a scanner fresh from rest."""
     scanner = Piezoscanner(plant, plan.sample_period, seed)
     drive = excitation_block(plan, 0, plan.total_samples)

@@ -5,7 +5,6 @@ from attrs import define, field
 from afm_scan_bench.in_process import drive_through
 from afm_scan_bench.scans import ALL, SEED, scan
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.record import Record
@@ -25,7 +24,7 @@ class InProcessSession:
         """Scan with all of a model's inverses. Raises ScanError where that cannot be."""
         return scan(spec, ALL, InverseSettings(), self.plant, model, seed=self._next_seed())
 
-    def experiment(self, plan: Plan[Waveform]) -> Record:
+    def experiment(self, plan: Plan) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         drive, measured = drive_through(plan, self.plant, self._next_seed())
         return Record.of_traces(plan.name, drive, measured, kind=plan.name)

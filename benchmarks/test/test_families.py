@@ -10,7 +10,7 @@ from afm_scan_ros.core.identification.drives.excitation import (
     hysteresis_plan,
     validation_plan,
 )
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.identification.records.motion import saturation_problems
 
 NOISE = 2e-4

@@ -15,7 +15,7 @@ from afm_scan_ros.cli.main import main
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
-from afm_scan_ros.files.model_pair import SEAL
+from afm_scan_ros.files.arrays import SEAL
 
 CONFIG = share_directory() / "config"
 ROOT = Path(__file__).parents[2]

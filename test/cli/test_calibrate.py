@@ -15,7 +15,6 @@ from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
 from helpers.in_process import default_plant, drive_through
@@ -120,7 +119,7 @@ def slow_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _at_start_of_each_process(SLOW_SOURCE, tmp_path, monkeypatch)
     block = execution.excitation_block
 
-    def slowly(plan: Plan[Waveform], first: int, count: int) -> Trace:
+    def slowly(plan: Plan, first: int, count: int) -> Trace:
         time.sleep(2.0 if first else 0.0)
         return block(plan, first, count)
 

@@ -30,7 +30,8 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory, version
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.report.diagnosis_text import HELD_OUT, proposal
+from afm_scan_ros.report.diagnosis_text import proposal
+from afm_scan_ros.report.sentences import sentence
 from helpers.in_process import ALL, default_model, scan
 
 CONFIG = share_directory() / "config"
@@ -177,7 +178,7 @@ def test_a_residual_says_what_it_is_of(run: Run) -> None:
     assert "stretches that the values were not fitted to" in run.document["residual_rms_is_of"]
     page = (run.out / "report.html").read_text("utf-8")
     for words in (page, run.result.output):
-        assert HELD_OUT in " ".join(words.split())
+        assert sentence("residual.of_all_records") in " ".join(words.split())
     assert "nm rms over the whole record" in page
 
 

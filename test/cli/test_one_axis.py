@@ -18,7 +18,7 @@ from afm_scan_ros.model import Model, load_model
 from helpers.in_process import default_plant, record
 from helpers.small_records import bag, creep, frequency, levels
 
-PLANS = creep(), frequency(), Plan("hysteresis", *map(levels, (8, 9)))
+PLANS = creep(), frequency(), Plan("hysteresis", 5e-5, *map(levels, (8, 9)))
 RESONANCE = 453.9363  # Hz, of the least damped root of Eq. 5
 
 

@@ -16,7 +16,6 @@ from afm_scan_ros.cli import calibrate as command
 from afm_scan_ros.cli.driving import DrivenScanner
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Waveform, whole
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
@@ -42,9 +41,9 @@ class InProcess:
 
     stops: str = "never"
     gain: float = 1.0
-    plans: list[Plan[Waveform]] = field(factory=list)
+    plans: list[Plan] = field(factory=list)
 
-    def record(self, plan: Plan[Waveform], bag: Path, title: str) -> None:
+    def record(self, plan: Plan, bag: Path, title: str) -> None:
         self.plans.append(plan)
         drive, moved = drive_through(plan, default_plant(), seed=1)
         moved = evolve(moved, x=self.gain * moved.x, y=self.gain * moved.y)
@@ -62,8 +61,8 @@ def calibrate(scanner: InProcess, *words: str) -> Result:
         return CliRunner().invoke(command.calibrate, words, standalone_mode=False)
 
 
-def peak_of(plan: Plan[Waveform]) -> float:
-    return max(float(np.abs(whole(wave)).max()) for wave in (plan.x, plan.y))
+def peak_of(plan: Plan) -> float:
+    return max(float(np.abs(wave).max()) for wave in (plan.x, plan.y))
 
 
 def test_drives_grow_until_an_operator_stops_and_go_on_with_what_is_recorded(
@@ -117,8 +116,8 @@ def test_the_limits_of_a_driver_s_settings_hold(tmp_path: Path) -> None:
     assert "beyond the amplifier's 20 V/s" in done.output
     (plan,) = scanner.plans
     for wave in (plan.x, plan.y):
-        assert 16.0 * np.abs(whole(wave)).max() <= 3.0
-        assert 16.0 * np.abs(np.diff(whole(wave))).max() / plan.sample_period <= 20.0
+        assert 16.0 * np.abs(wave).max() <= 3.0
+        assert 16.0 * np.abs(np.diff(wave)).max() / plan.sample_period <= 20.0
     refused = calibrate(scanner, *words, str(tmp_path / "no"), "--limit", "4V")
     assert isinstance(refused.exception, InputError)
     assert "beyond the scanner's limit of 3 V" in str(refused.exception)

@@ -4,7 +4,7 @@ import pytest
 
 from afm_scan_ros.cli.processes import Ended, raise_failure
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.nodes.flow import STOPPED
+from afm_scan_ros.nodes.parameters import STOPPED
 
 
 def test_a_stopped_scan_is_incomplete_to_the_command() -> None:

@@ -7,11 +7,10 @@ import pytest
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import Plan
-from afm_scan_ros.core.identification.drives.waveforms import Sampled, whole
 from afm_scan_ros.files.drive_files import read_drive, save_drive, write_drives
 
 DRIVE = np.random.default_rng(1).standard_normal((50, 2))
-PLAN = Plan("steps", Sampled(1e-4, DRIVE[:, 0]), Sampled(1e-4, DRIVE[:, 1]))
+PLAN = Plan("steps", 1e-4, DRIVE[:, 0], DRIVE[:, 1])
 
 
 def test_a_drive_is_read_to_the_bit(tmp_path: Path) -> None:
@@ -19,7 +18,7 @@ def test_a_drive_is_read_to_the_bit(tmp_path: Path) -> None:
     first = read_drive(exported.with_suffix(".npz"))
     for found in (first, read_drive(save_drive(tmp_path, PLAN))):
         assert (found.name, found.sample_period) == ("steps", 1e-4)
-        np.testing.assert_array_equal(np.column_stack([whole(found.x), whole(found.y)]), DRIVE)
+        np.testing.assert_array_equal(np.column_stack([found.x, found.y]), DRIVE)
 
 
 @pytest.mark.parametrize(

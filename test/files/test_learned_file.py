@@ -12,7 +12,7 @@ from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import total_samples
-from afm_scan_ros.files.learned_file import load_learned, save_learned
+from afm_scan_ros.files.drive_files import load_learned, save_learned
 from helpers.in_process import default_model
 
 SPEC = ScanSpec(line_rate=30.1, lines=2, samples_per_line=200, preparation="none")

@@ -26,8 +26,8 @@ from afm_scan_ros.core.model import (
     VibrationModel,
 )
 from afm_scan_ros.files import yaml
+from afm_scan_ros.files.arrays import SEAL, load_sealed
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
-from afm_scan_ros.files.model_pair import SEAL, load_sealed
 
 
 def surface(slope: float) -> EverettSurface:

@@ -15,8 +15,8 @@ from attrs import evolve
 import afm_scan_ros as afm
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import share_directory
+from afm_scan_ros.files.arrays import SEAL
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.model_pair import SEAL
 from afm_scan_ros.files.paths import replacing, write_text
 
 CONFIG = share_directory() / "config"

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.image import imsave
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.files.plant_file import load_sample
 
 RAMP = np.linspace(0.0, 1.0, 256).reshape(16, 16)
 WHITE = 200e-9

@@ -21,8 +21,8 @@ from afm_scan_ros.core.model import (
 )
 from afm_scan_ros.core.spread import Spread, Variant
 from afm_scan_ros.files import yaml
+from afm_scan_ros.files.arrays import load_sealed
 from afm_scan_ros.files.model_file import load_model, model_hash, save_model
-from afm_scan_ros.files.model_pair import load_sealed
 
 PERIOD = 1e-3
 

@@ -14,7 +14,7 @@ from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.files import share_directory, yaml
-from afm_scan_ros.files.model_pair import SEAL
+from afm_scan_ros.files.arrays import SEAL
 
 
 def given_model() -> afm.Model:

@@ -8,7 +8,6 @@ from attrs import define, field
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.identification.records.recording import checked
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
@@ -88,7 +87,7 @@ class InProcessSession:
         seed = self._next_seed()
         return scan(spec, ALL, InverseSettings(), self.plant, model, seed, correction)
 
-    def experiment(self, plan: Plan[Waveform]) -> Record:
+    def experiment(self, plan: Plan) -> Record:
         """Drive the scanner through an experiment, which the plan is named after."""
         drive, measured = drive_through(plan, self.plant, self._next_seed())
         return Record.of_traces(plan.name, drive, measured, kind=plan.name)
@@ -98,7 +97,7 @@ class InProcessSession:
         return self.seed + self._made - 1
 
 
-def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
+def record(plan: Plan, plant: PlantSpec, seed: int) -> Record:
     """Drive a scanner fresh from rest through one plan.
 
     Raises InputError where that is no calibration record, as an axis at rest is none.
@@ -106,7 +105,7 @@ def record(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> Record:
     return checked(Record.of_traces(plan.name, *drive_through(plan, plant, seed)))
 
 
-def drive_through(plan: Plan[Waveform], plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
+def drive_through(plan: Plan, plant: PlantSpec, seed: int) -> tuple[Trace, Trace]:
     """Drive (V) and measured displacement (m) of a scanner fresh from rest."""
     scanner = Piezoscanner(plant, plan.sample_period, seed)
     drive = excitation_block(plan, 0, plan.total_samples)

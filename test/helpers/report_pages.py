@@ -41,8 +41,7 @@ from afm_scan_ros.report.analysis import analyse
 from afm_scan_ros.report.close_loop import close_loop_report
 from afm_scan_ros.report.diagnosis_page import diagnosis_report
 from afm_scan_ros.report.fit_page import fit_report
-from afm_scan_ros.report.page import CommandLine, ReportPage
-from afm_scan_ros.report.provenance import Provenance, provenance_of, source_of
+from afm_scan_ros.report.page import CommandLine, Provenance, ReportPage, provenance_of, source_of
 from afm_scan_ros.report.scan_pictures import (
     WITH,
     WITHOUT,

@@ -5,8 +5,8 @@ import time
 import pytest
 from rclpy.publisher import Publisher
 
+from afm_scan_ros.nodes.block_source import TrajectoryGenerator
 from afm_scan_ros.nodes.peers import DONE
-from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 from helpers.ros import PATIENCE, joined
 
 

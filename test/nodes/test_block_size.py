@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.streams import MAX_BLOCK
-from afm_scan_ros.nodes.flow import LEAST_BLOCK, USUAL_RATE, block_size_at
-from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
+from afm_scan_ros.nodes.block_source import TrajectoryGenerator
+from afm_scan_ros.nodes.parameters import LEAST_BLOCK, USUAL_RATE, block_size_at
 from helpers.ros import joined
 
 Generate = Callable[..., TrajectoryGenerator]

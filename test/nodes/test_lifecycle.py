@@ -19,7 +19,7 @@ from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.peers import FAILED, RUNNING, Report
-from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
+from afm_scan_ros.nodes.scanner_node import PiezoscannerSim
 from afm_scan_ros.nodes.topics import ACHIEVED, DRIVE, NODE_STATE
 from afm_scan_ros.simulation.scanner import Piezoscanner
 from helpers.in_process import default_plant

@@ -23,6 +23,7 @@ from afm_scan_ros.nodes.middleware import (
     KEPT,
     LOCAL,
     NEWER,
+    OF_VIEWERS,
     PROFILES,
     SEGMENT,
     URI,
@@ -158,6 +159,16 @@ def test_fast_dds_gets_our_profile_and_again_no_other() -> None:
     for _ in range(2):
         assert prepare(environment) == []
         assert environment == {PROFILES: str(OURS)}
+
+
+def test_a_viewer_of_a_node_has_no_shared_memory() -> None:
+    environment: dict[str, str] = {}
+    prepare(environment)
+    assert prepare(environment, OF_VIEWERS) == []
+    file = Path(environment[PROFILES])
+    tree = ET.parse(file)  # noqa: S314 - our own file
+    kinds = [element.text for element in tree.iter() if element.tag.endswith("}type")]
+    assert kinds == ["UDPv4"]
 
 
 def test_a_users_profile_stays_and_is_checked(tmp_path: Path) -> None:

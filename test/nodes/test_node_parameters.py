@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from importlib import import_module
 
 import pytest
 from rclpy.node import Node
@@ -15,7 +14,8 @@ from afm_scan_ros.nodes import NODES
 from afm_scan_ros.nodes.declare import declare, scan_spec
 from afm_scan_ros.nodes.messages import Message
 from afm_scan_ros.nodes.parameters import NodeParameter, inverses_of, scan_spec_parameters
-from afm_scan_ros.nodes.scan_node import COMMON, ScanNode
+from afm_scan_ros.nodes.run import node_class
+from afm_scan_ros.nodes.scan_node import COMMON
 from helpers.ros import joined
 
 Start = Callable[..., Node]
@@ -35,19 +35,9 @@ def start() -> Iterator[Start]:
         yield make
 
 
-def kind_of(name: str) -> type[ScanNode]:
-    module = import_module(f"afm_scan_ros.nodes.{name}")
-    (kind,) = (
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, ScanNode) and vars(value).get("NAME")
-    )
-    return kind
-
-
 def parameters_of(name: str) -> dict[str, NodeParameter]:
     scan = scan_spec_parameters() if name == "trajectory_generator" else []
-    return {each.name: each for each in (*COMMON, *kind_of(name).PARAMETERS, *scan)}
+    return {each.name: each for each in (*COMMON, *node_class(name).PARAMETERS, *scan)}
 
 
 @pytest.mark.parametrize("value", [".nan", ".inf", "-.inf"])
@@ -158,4 +148,4 @@ def test_a_file_that_is_missing_is_named_with_its_parameter(
 ) -> None:
     start(f"{parameter}:=nowhere.yaml", *others)
     with pytest.raises(InputError, match=rf"^parameter {parameter}: nowhere.yaml: no such file"):
-        kind_of(node)()
+        node_class(node)()

@@ -18,7 +18,6 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.cli.driving import DrivenScanner, run_calibration
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS, resized
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.features.learning.learn_command import learn
@@ -77,7 +76,7 @@ def test_a_scan_is_learned_from_a_node_in_a_loop(tmp_path: Path) -> None:
         assert errors[-1] < 0.5 * errors[0]
 
 
-def small(name: str) -> Plan[Waveform]:
+def small(name: str) -> Plan:
     return resized(EXPERIMENTS[name].plan(), 0.2, 2.0)
 
 

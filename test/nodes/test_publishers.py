@@ -22,14 +22,14 @@ from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.safety import SafetySettings
+from afm_scan_ros.nodes.block_source import TrajectoryGenerator
 from afm_scan_ros.nodes.messages import Message, info_message, state_message
 from afm_scan_ros.nodes.peers import FAILED, READY, RUNNING, Report
-from afm_scan_ros.nodes.piezoscanner_sim import PiezoscannerSim
 from afm_scan_ros.nodes.run import hear
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
+from afm_scan_ros.nodes.scanner_node import PiezoscannerSim
 from afm_scan_ros.nodes.topics import DESIRED, DRIVE, NODE_STATE, SCAN_INFO, NodeTopic
-from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 from helpers.ros import PATIENCE, joined, publisher, until
 
 QUARTER = 1000

@@ -19,7 +19,7 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.model_file import load_model, save_model
-from afm_scan_ros.nodes.flow import USUAL_WINDOW
+from afm_scan_ros.nodes.parameters import USUAL_WINDOW
 from afm_scan_ros.nodes.peers import DONE, RUNNING
 from afm_scan_ros.nodes.topics import BLOCKS
 from helpers.scaling import scaled_axis

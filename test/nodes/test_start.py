@@ -7,8 +7,8 @@ import sys
 import pytest
 from rclpy.node import Node
 
+from afm_scan_ros.nodes.block_source import TrajectoryGenerator
 from afm_scan_ros.nodes.topics import NODE_STATE, SCAN_INFO
-from afm_scan_ros.nodes.trajectory_generator import TrajectoryGenerator
 from helpers.ros import PATIENCE, joined, until
 
 SLOW_IMPORT = """

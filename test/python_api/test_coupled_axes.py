@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import afm_scan_ros as afm
-from afm_scan_ros.files.model_pair import SEAL
+from afm_scan_ros.files.arrays import SEAL
 
 PERIOD, SAMPLES, LINES = 1e-3, 512, 200
 AXES = ("a", "b", "c")

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from afm_scan_ros.report.close_loop import REPLAYED, outcome
+from afm_scan_ros.report.close_loop import outcome
+from afm_scan_ros.report.sentences import sentence
 
 
 @pytest.mark.parametrize(("name", "message"), [("drift", 1), ("delay", 0)])
@@ -20,4 +21,4 @@ def test_a_drift_undone_is_said_to_be_a_replay(name: str, message: int) -> None:
         worse={},
         kept=False,
     )
-    assert list(outcome(done)).count(REPLAYED) == message
+    assert list(outcome(done)).count(sentence("loop.replayed")) == message

@@ -108,6 +108,7 @@ def test_the_size_of_an_experiment_has_three_digits_and_exceeds_no_limit() -> No
 def test_an_unexplained_residual_is_said_to_exceed_its_limit_in_a_band() -> None:
     limit = SimpleNamespace(edges=(0.0, 10.0, 40.0, 160.0))
     of_axis = SimpleNamespace(
+        axis="x",
         verdict=UNEXPLAINED,
         ratio_before=(np.array([0.5, 3.2, 1.1]),),
         evidence=(SimpleNamespace(limit=limit),),

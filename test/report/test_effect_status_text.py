@@ -3,7 +3,7 @@
 import pytest
 
 from afm_scan_ros.core.model import EffectStatus, ParameterInterval
-from afm_scan_ros.report.effect_status_text import intervals_text, status_text
+from afm_scan_ros.report.sentences import intervals_text, status_text
 
 
 @pytest.mark.parametrize(

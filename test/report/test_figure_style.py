@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.report.paper import paper_figure, save
+from afm_scan_ros.report.paper import STYLE, paper_figure, save
 from afm_scan_ros.report.scan_pictures import Images, image_picture
-from afm_scan_ros.report.style import STYLE
 
 LABELS = "axes.formatter.min_exponent"
 

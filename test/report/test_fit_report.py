@@ -10,8 +10,7 @@ from markupsafe import escape
 
 from afm_scan_ros.core.identification.findings import UncertainScan
 from afm_scan_ros.core.identification.identify import Identification, identify_records
-from afm_scan_ros.report.fit_page import fit_picture, fit_report
-from afm_scan_ros.report.fit_summary import finding_text, fit_summary
+from afm_scan_ros.report.fit_page import finding_text, fit_picture, fit_report, fit_summary
 from afm_scan_ros.report.picture import Curve
 from helpers.fit_cases import FREQUENCY, GAIN, OPERATORS, levels, record
 

@@ -17,7 +17,7 @@ from afm_scan_ros.core.identification.findings import (
     UnknownStart,
     ValidationMismatch,
 )
-from afm_scan_ros.report.fit_summary import finding_text
+from afm_scan_ros.report.fit_page import finding_text
 
 EXAMPLES: dict[Finding, tuple[str, ...]] = {
     ValidationMismatch("check.csv", 0.04): ("predicts check.csv", "4.0%", "one axis"),

@@ -3,7 +3,7 @@
 import pytest
 
 from afm_scan_ros.core.scan_info import ScanInfo
-from afm_scan_ros.report.provenance import source_of
+from afm_scan_ros.report.page import source_of
 
 
 @pytest.mark.parametrize("rate", [50_000, 49_000, 3.0])

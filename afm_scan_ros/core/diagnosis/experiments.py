@@ -31,7 +31,6 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of, predict
@@ -57,7 +56,7 @@ class SizedExperiment:
         listed = EXPERIMENTS[name]
         return cls(name, listed.amplitude_for(model), listed.duration_for(model))
 
-    def plan_for(self, model: ScannerModel) -> Plan[Waveform]:
+    def plan_for(self, model: ScannerModel) -> Plan:
         """Return the drive for the scanner of a model."""
         return EXPERIMENTS[self.name].plan_for(model, self.amplitude, self.duration)
 

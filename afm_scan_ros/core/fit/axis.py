@@ -16,15 +16,15 @@ from afm_scan_ros.core.fit.alternatives import (
     without_lead,
 )
 from afm_scan_ros.core.fit.descent import LINEAR, VIBRATION, settle
-from afm_scan_ros.core.fit.directions import lost_by
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.likeness import refuse_unlike
-from afm_scan_ros.core.fit.model_of_fit import model_of
+from afm_scan_ros.core.fit.model_of_fit import lost_by, model_of
 from afm_scan_ros.core.fit.modes import add_first_mode, add_mode
 from afm_scan_ros.core.fit.parameters import layout_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.signals import signals_of, steps_read_after
+from afm_scan_ros.core.fit.tones import free_tones
 from afm_scan_ros.core.intersample import held_voltages
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array, ProgressCallback
@@ -33,40 +33,18 @@ from afm_scan_ros.core.types import Array, ProgressCallback
 def fit_axis(
     records: Sequence[Record],
     axis: str,
-    settings: FitSettings = DEFAULT_SETTINGS,
     progress: ProgressCallback = lambda _: None,
     *,
     linear: bool = False,
 ) -> AxisFit:
     """Fit all parameters of an axis to all of its records; none needs a kind.
 
-    Parameters
-    ----------
-    records
-        Records that hold the axis, at least one of which moves.
-    axis
-        Its name.
-    settings
-        What is resolved, expected, and taken for significant.
-    progress
-        Is called with what is being fitted, and with what of a record does not count.
-    linear
-        Whether the scanner has no hysteresis, so that its operator stays a straight line.
-
-    Returns
-    -------
-    AxisFit
-        Its operator is plays, unless these leave more than noise and one state has clearly the
-        greater evidence.
-
-    Raises
-    ------
-    InputError
-        Where no record moves, and for a record that is too short, of another scanner than the
-        others, or has its columns exchanged.
-    ScanError
-        Where the fit diverges.
+    The operator of a ``linear`` scanner stays a straight line. That of others is plays, unless
+    these leave more than noise and one state has clearly the greater evidence. Raises InputError
+    where no record moves, and for a record that is too short, of another scanner than the others,
+    or has its columns exchanged, and ScanError where the fit diverges.
     """
+    settings = DEFAULT_SETTINGS
     fit = started(records, axis, settings, linear=linear)
     for record in fit.records:
         if record.first:
@@ -86,7 +64,7 @@ def fit_axis(
     progress("fitting all effects together")
     while True:
         settle(fit, settings.most_steps, searching=True)
-        if fit.find_tones():
+        if free_tones(fit):
             continue
         if not add_mode(fit):
             break
@@ -105,7 +83,7 @@ def _of_linear(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     """Fit modes, lags, creep and tones to what a straight line leaves."""
     while True:
         settle(fit, fit.layout.settings.most_steps, LINEAR, searching=True)
-        if not (fit.find_tones() or add_mode(fit)):
+        if not (free_tones(fit) or add_mode(fit)):
             break
         progress("fitting a further mode")
     fit = without_lead(fit, progress, LINEAR)
@@ -123,17 +101,17 @@ def _of_plays(fit: AxisFit, progress: ProgressCallback) -> AxisFit:
     settings = fit.layout.settings
     by_plays = (*fit.layout.operator.parts, *LINEAR, "rest", "memory")
     settle(fit, settings.stage_steps, by_plays)
-    fit.find_tones()
+    free_tones(fit)
     while add_mode(fit):
         settle(fit, settings.stage_steps, by_plays)
-        fit.find_tones()
+        free_tones(fit)
     if fit.layout.unknown_starts:
         fit = with_rest(fit, progress, by_plays)
     progress("fitting the map behind the hysteresis")
     settle(fit, settings.stage_steps)
-    fit.find_tones()
+    free_tones(fit)
     settle(fit, settings.stage_steps, searching=True)
-    fit.find_tones()
+    free_tones(fit)
     return with_rest(fit, progress)
 
 

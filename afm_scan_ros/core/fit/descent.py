@@ -7,6 +7,14 @@ The second derivative m'' of the model along a step v bends it by the geodesic a
 Sources: K. Madsen, H. B. Nielsen and O. Tingleff, Methods for Non-Linear Least Squares Problems,
 DTU 2004, algorithm 3.16, for the damping λ; M. K. Transtrum and J. P. Sethna, arXiv:1201.5885,
 sections 3 and 4, for the acceleration.
+
+How large parameters are expected to be, the scales of their prior, maximises the evidence. About θ
+the residuals are linear, and under a prior of precision Λ and mean m it is, but for a constant,
+
+    ½ bᵀ (H + Λ)⁻¹ b - ½ ln |H + Λ| + ½ ln |Λ|,    b = g + H (θ - m)
+
+so that no record is looked at again.
+Source: D. J. C. MacKay, Neural Computation 4 (1992) 415, section 3.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,11 +23,12 @@ from typing import TypeAlias
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.evidence import best_scales
-from afm_scan_ros.core.fit.parameters import Layout
+from afm_scan_ros.core.fit.one_state import OneState
+from afm_scan_ros.core.fit.parameters import SEARCHED, Layout
 from afm_scan_ros.core.types import Array
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -47,7 +56,7 @@ def settle(
         fit.stalled = (
             fit.damping > 0.5 * damping and fit.layout.settings.most_steps * fell < fit.near
         )
-        fell -= fit.cover(fell)
+        fell -= cover(fit, fell)
         fit.weigh()
         heavier = max(1.0, before / fit.discrepancy) ** 2
         fit.remaining = heavier * abs(fit.remaining - fell)
@@ -55,6 +64,29 @@ def settle(
         tried += [scales] if near else []
         if chosen and (fit.converged or fit.stalled):
             break
+
+
+def cover(fit: AxisFit, most: float) -> float:
+    """Let the tables of an operator reach as far as its states do; return what that loses.
+
+    Where tables on other cells would raise the objective by ``most`` (nat) or more, those that
+    there are stay: beyond their cells they continue with the values of their edge.
+    """
+    operator = fit.layout.operator
+    if not isinstance(operator, OneState):
+        return 0.0
+    pairs = zip(fit.records, fit.simulated(fit.theta), strict=True)
+    states = [simulation.effective - record.drive for record, simulation in pairs]
+    wider, theta = operator.covering(fit.layout.of_operator(fit.theta), np.concatenate(states))
+    if wider is operator:
+        return 0.0
+    before, kept = fit.objective(fit.theta), (fit.layout, fit.theta)
+    fit.layout = evolve(fit.layout, operator=wider)
+    fit.theta = np.concatenate([theta, fit.theta[len(theta) :]])
+    if (lost := fit.objective(fit.theta) - before) < most:
+        return lost
+    fit.layout, fit.theta = kept
+    return 0.0
 
 
 def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -> float:
@@ -226,3 +258,36 @@ def bounded(matrix: Array, right: Array, free: Mask, lowest: Array) -> Array:
         fewest = min(fewest, len(wrong))
         loose[exchanged] = ~loose[exchanged]
     return np.where(free, np.maximum(move, lowest), 0.0)
+
+
+def best_scales(
+    layout: Layout, scales: Mapping[str, float], theta: Array, matrix: Array, right: Array
+) -> dict[str, float]:
+    """Double or halve each scale in turn for as long as the evidence grows by a tenth of a nat."""
+    found = dict(scales)
+    best = evidence(layout, found, theta, matrix, right)
+    for name in SEARCHED:
+        largest = getattr(layout.settings, name)
+        for factor in (2.0, 0.5):
+            while largest / 2.0**12 < found[name] * factor <= largest:
+                trial = {**found, name: factor * found[name]}
+                value = evidence(layout, trial, theta, matrix, right)
+                if value <= best + 0.1:
+                    break
+                found, best = trial, value
+    return found
+
+
+def evidence(
+    layout: Layout, scales: Mapping[str, float], theta: Array, matrix: Array, right: Array
+) -> float:
+    """Logarithm of the marginal likelihood, but for a constant; H is ``matrix``, g ``right``."""
+    precision, mean = layout.prior(scales, theta)
+    pulled = right + matrix @ (theta - mean)
+    try:
+        factor = cho_factor(matrix + precision)
+    except LinAlgError:
+        return -np.inf
+    explained = 0.5 * float(pulled @ cho_solve(factor, pulled))
+    volume = np.log(np.diag(factor[0])).sum() - 0.5 * np.linalg.slogdet(precision)[1]
+    return float(explained - volume)

@@ -11,46 +11,20 @@ does not: so a step is approximate, and what it leads to is exact.
 """
 
 from collections.abc import Iterable, Iterator
-from functools import cached_property
 
 import numpy as np
-from attrs import define, evolve, field, frozen
+from attrs import define, evolve, field
 from scipy.optimize import minimize_scalar
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.evidence import first_scales
-from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode
-from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
-from afm_scan_ros.core.fit.signals import Signals, noise_of
-from afm_scan_ros.core.fit.simulation import Simulation, simulate
-from afm_scan_ros.core.fit.stretches import averaged
-from afm_scan_ros.core.fit.tones import find_tones, offered_tones
+from afm_scan_ros.core.fit.noise import noise_of
+from afm_scan_ros.core.fit.parameters import Columns, Layout, Mode, first_scales
+from afm_scan_ros.core.fit.signals import (
+    Free,
+    Signals,
+)
+from afm_scan_ros.core.fit.simulation import Simulation, jacobian, pulled, simulate
 from afm_scan_ros.core.types import Array
-
-
-@frozen(eq=False)
-class Free:
-    """What is free in one record, as linear regressors with their prior, and their products."""
-
-    columns: Array
-    products: Array
-    variance: float
-
-    @cached_property
-    def matrix(self) -> Array:
-        """H of the regressors, of which all but the offset have a prior of unit variance."""
-        prior = np.diag([0.0, *np.ones(len(self.products) - 1)])
-        return np.asarray(self.products / self.variance + prior)
-
-    def weights(self, signal: Array) -> Array:
-        """Weights of the regressors that explain a signal best."""
-        right = self.columns.T @ signal / self.variance
-        return np.asarray(np.linalg.solve(self.matrix, right))
-
-    def without(self, signal: Array) -> Array:
-        """Return a signal without what the regressors explain of it."""
-        return np.asarray(signal - self.columns @ self.weights(signal))
 
 
 @define(eq=False)
@@ -146,7 +120,7 @@ class AxisFit:
             self._last = self.layout, theta, every
         return self._last[2]
 
-    def _without(self, theta: Array, *, gathered: bool) -> Iterator[tuple[Array, Array]]:
+    def left_of(self, theta: Array, *, gathered: bool) -> Iterator[tuple[Array, Array]]:
         """Yield what the model leaves of each record, and that without what is free in it, m."""
         pairs = zip(self.records, self.simulated(theta), strict=True)
         for k, (record, simulation) in enumerate(pairs):
@@ -156,7 +130,7 @@ class AxisFit:
 
     def residuals(self) -> list[Array]:
         """Residuals (m) of the blocks that count, what is free in each record being fitted."""
-        return [residual for _, residual in self._without(self.theta, gathered=False)]
+        return [residual for _, residual in self.left_of(self.theta, gathered=False)]
 
     def motions(self) -> list[Array]:
         """Motion (m) of the model in the blocks that count of each record."""
@@ -165,7 +139,7 @@ class AxisFit:
 
     def gathered(self) -> list[Array]:
         """Residuals (m) of the stretches that count, as ``Signals.gathered``."""
-        return [residual for _, residual in self._without(self.theta, gathered=True)]
+        return [residual for _, residual in self.left_of(self.theta, gathered=True)]
 
     def misfit(self, theta: Array, *, gathered: bool = True) -> float:
         """Half the weighted sum of squared residuals, and of squared weights of what is free.
@@ -173,7 +147,7 @@ class AxisFit:
         These are fitted, so that both together are half of what the model leaves times what remains
         of that. Residuals are those ``gathered`` over stretches, or else of blocks.
         """
-        pairs = zip(self.records, self._without(theta, gathered=gathered), strict=True)
+        pairs = zip(self.records, self.left_of(theta, gathered=gathered), strict=True)
         return sum(0.5 * float(a @ b) / self.variance(record) for record, (a, b) in pairs)
 
     def objective(self, theta: Array) -> float:
@@ -205,18 +179,14 @@ class AxisFit:
 
         Raises ScanError where they overflow.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            matrix, right = self._normal(with_operator=with_operator)
-        return _finite(matrix), _finite(right)
-
-    def _normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
-        for k, left in enumerate(self.gathered()):
-            pieces = self.columns(k, with_operator=with_operator)
-            of_record = self.products(k, left, pieces)
-            matrix += of_record[0]
-            right += of_record[1]
-        return matrix, right
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, left in enumerate(self.gathered()):
+                pieces = self.columns(k, with_operator=with_operator)
+                of_record = self.products(k, left, pieces)
+                matrix += of_record[0]
+                right += of_record[1]
+        return _finite(matrix), _finite(right)
 
     def products(
         self, k: int, left: Array, pieces: Iterable[tuple[slice, Array]]
@@ -264,27 +234,6 @@ class AxisFit:
                 right += pulled(here[k], pieces, pull[:, np.newaxis])[:, 0]
         return _finite(right)
 
-    def cover(self, most: float) -> float:
-        """Let the tables of an operator reach as far as its states do; return what that loses.
-
-        Where tables on other cells would raise the objective by ``most`` (nat) or more, those that
-        there are stay: beyond their cells they continue with the values of their edge.
-        """
-        operator = self.layout.operator
-        if isinstance(operator, OneState):
-            pairs = zip(self.records, self.simulated(self.theta), strict=True)
-            states = [simulation.effective - record.drive for record, simulation in pairs]
-            given = self.layout.of_operator(self.theta)
-            wider, theta = operator.covering(given, np.concatenate(states))
-            if wider is not operator:
-                before, kept = self.objective(self.theta), (self.layout, self.theta)
-                self.layout = evolve(self.layout, operator=wider)
-                self.theta = np.concatenate([theta, self.theta[len(theta) :]])
-                if (lost := self.objective(self.theta) - before) < most:
-                    return lost
-                self.layout, self.theta = kept
-        return 0.0
-
     def weigh(self) -> None:
         """Estimate the noise of records whose blocks are samples, and η: the likeliest."""
         parts = []
@@ -303,50 +252,6 @@ class AxisFit:
 
         ends = np.log([np.finfo(np.float32).eps, 1.0 / np.finfo(np.float32).eps])
         self.discrepancy = float(np.exp(minimize_scalar(unlikely, bounds=ends).x))
-
-    def find_tones(self) -> bool:
-        """Let sines in the residuals be free in their records; return whether there are more.
-
-        They are sought anew each time, as one may have been what the model lacked. A record too
-        short to show a sine is tried for those of the others, and for mains.
-        """
-        settings, before = self.layout.settings, sum(len(one.tones) for one in self.records)
-        lefts = list(self._with_tones())
-        triples = zip(self.records, lefts, self.motions(), strict=True)
-        for k, (record, left, motion) in enumerate(triples):
-            drive = averaged(record.drive, record.block)[record.used]
-            found = find_tones(left, drive, motion, record.length, settings)
-            self.records[k] = evolve(record, tones=()).with_tones(found, settings.tone_most)
-        known = {tone for record in self.records for tone in record.tones}
-        known |= {settings.slower_mains, settings.faster_mains}
-        for k, left in enumerate(lefts):
-            record = self.records[k]
-            lasts = record.length * len(record.mean)
-            hidden = [tone for tone in known if 1.0 < tone * lasts < settings.tone_cycles]
-            expected = self.variance(record)
-            found = offered_tones(left, record.seconds, hidden, expected, settings)
-            self.records[k] = record.with_tones(found, settings.tone_most)
-        self.weigh()
-        return sum(len(one.tones) for one in self.records) > before
-
-    def _with_tones(self) -> Iterator[Array]:
-        """Yield what the model leaves of each record, its tones included, m."""
-        lefts = self._without(self.theta, gathered=False)
-        for k, (record, (left, without)) in enumerate(zip(self.records, lefts, strict=True)):
-            free, first = self.free_of(k, gathered=False), -4 * len(record.tones)
-            tones = free.columns[:, first:] @ free.weights(left)[first:] if first else 0.0
-            yield without + tones
-
-    def tone_amplitudes(self) -> list[tuple[tuple[float, float], ...]]:
-        """Frequency (Hz) and amplitude (m), in the middle of the record, of each record's tones."""
-        found = []
-        lefts = self._without(self.theta, gathered=False)
-        for k, (record, (left, _)) in enumerate(zip(self.records, lefts, strict=True)):
-            free = self.free_of(k, gathered=False)
-            weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
-            sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
-            found.append(tuple(zip(record.tones, map(float, sizes), strict=True)))
-        return found
 
     def add(self, mode: Mode) -> None:
         """Add a mode."""

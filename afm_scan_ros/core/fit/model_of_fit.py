@@ -1,20 +1,41 @@
-"""The model that a fit has found: the effects of an axis with their direct inverse."""
+"""The model that a fit has found, and its few directions of uncertainty that move predictions most.
+
+The model has the effects of an axis with their direct inverse. Predictions of a motion k with the
+derivatives J_k vary by tr(C G_k) in all, with G_k = J_kᵀ J_k and the covariance C = L Lᵀ of θ. The
+directions are L times the eigenvectors of
+
+    Lᵀ [Σ_k G_k / tr(C G_k)] L.
+
+Motions are the records, and scans from depolarised rest of several sizes, as fast and as slow as
+the records are: what no record tells shows in these.
+"""
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from attrs import evolve
-from scipy.optimize import brentq, nnls
 
-from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.creep import CreepModel
-from afm_scan_ros.core.effects.hysteresis.duhem import Duhem, DuhemSlopes
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown
-from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap, Preisach
+from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.effects.vibration import VibrationModel
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.candidates import rest_of
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.plays import Plays
-from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
-from afm_scan_ros.core.fit.starts import rest_of
+from afm_scan_ros.core.fit.signals import Signals
+from afm_scan_ros.core.fit.simulation import Simulation, jacobian, simulate
+from afm_scan_ros.core.fit.surfaces import (
+    direct_of,
+    everett,
+    everett_surface,
+    from_rest,
+    growing,
+    nearest_surface,
+    resting,
+    surface_levels,
+    surface_of,
+)
 from afm_scan_ros.core.model import AxisModel, HysteresisModel, HysteresisOperator
+from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Variant
 from afm_scan_ros.core.types import Array
 
@@ -46,31 +67,14 @@ def _hysteresis(fit: AxisFit) -> HysteresisModel:
     levels = layout.settings.direct_levels
     if isinstance(layout.operator, Plays):
         bias, _ = layout.operator.bias(rest_of(fit))
-        surface = layout.operator.surface(theta, bias, mixed=True)
+        surface = everett_surface(layout.operator, theta, bias, mixed=True)
         rest = layout.operator.output(theta, np.zeros(1), layout.operator.at_rest(rest_of(fit))[0])
-        surface = _resting(surface, float(rest[0]), layout.settings)
+        surface = resting(surface, float(rest[0]), layout.settings)
         surface, mapped = from_rest(surface, layout.map_of(fit.theta))
         return HysteresisModel(surface, direct_of(surface, mapped, levels), mapped)
     slopes = layout.operator.slopes(theta, rest_of(fit))
     nearest = nearest_surface(slopes, layout.settings)
     return HysteresisModel(slopes, direct_of(nearest, None, levels))
-
-
-def _resting(surface: EverettSurface, rest: float, settings: FitSettings) -> EverettSurface:
-    """Return a surface whose bias lets it rest at an output (V), as the plays do that it is of.
-
-    With their own bias it would rest up to 1/5000 of the range elsewhere, as there are no loops
-    between its levels. Where no bias nearby does so it stays.
-    """
-
-    def apart(bias: float) -> float:
-        return float(Preisach(evolve(surface, bias=bias)).at_rest().now[1]) - rest
-
-    own, most = surface.bias or 0.0, 0.5 * settings.rest_bias * (surface.upper - surface.lower)
-    ends = own - most, own + most
-    if apart(ends[0]) * apart(ends[1]) >= 0.0:
-        return surface
-    return evolve(surface, bias=float(brentq(apart, *ends)))
 
 
 def variant_of(fit: AxisFit, move: Array, deviations: float) -> Variant:
@@ -92,63 +96,107 @@ def _coarse(fit: AxisFit, theta: Array) -> tuple[HysteresisOperator, OutputMap |
     rest = rest_of(AxisFit(layout, fit.records, fit.gain, theta))
     if not isinstance(plays, Plays):
         return plays.slopes(given, rest), None
-    levels = plays.levels(settings.spread_levels)
-    fitted, _ = plays.everett(layout.of_operator(fit.theta), levels)
-    values, offset = plays.everett(given, levels)
-    values = values - fitted + plays.growing(fitted, levels)[0]
-    surface = plays.surface_of(values, offset, plays.bias(rest)[0])
+    levels = surface_levels(plays, settings.spread_levels)
+    fitted, _ = everett(plays, layout.of_operator(fit.theta), levels)
+    values, offset = everett(plays, given, levels)
+    values = values - fitted + growing(plays, fitted, levels)[0]
+    surface = surface_of(plays, values, offset, plays.bias(rest)[0])
     return from_rest(surface, layout.map_of(theta))
 
 
-def from_rest(
-    surface: EverettSurface, mapped: OutputMap | None
-) -> tuple[EverettSurface, OutputMap | None]:
-    """Return a surface and the map behind it moved so that F = 0 at the model's own rest."""
-    rest = float(Preisach(surface).at_rest().now[1])
-    if mapped is None:
-        return evolve(surface, offset=surface.offset - rest), None
-    shift = float(mapped.output(np.array([rest]))[0])
-    mapped = evolve(mapped, lower=mapped.lower - shift, upper=mapped.upper - shift)
-    return evolve(surface, offset=surface.offset - shift), mapped
+def variants(
+    fit: AxisFit, covariance: Array, every: Sequence[Array]
+) -> tuple[Variant, tuple[Variant, ...]]:
+    """Return the fit's own effects, and those in each direction of a covariance of θ.
 
-
-def direct_of(surface: EverettSurface, mapped: OutputMap | None, count: int) -> EverettSurface:
-    """Return the direct inverse's surface of ``count`` levels, from the exact inverse.
-
-    U(alpha, beta) is half of what the drive falls by as F falls from alpha to beta, after it has
-    risen from the least F. Croft, Shed and Devasia (2001), Eq. 16, from F to u. Where U hardly
-    grows between two levels it is mixed with a straight line.
+    ``every`` are the normal equations' H of each record. A step in a direction is shorter than a
+    standard deviation where the effects would have no inverse, or not be stable, at its end.
     """
-    behind = () if mapped is None else (mapped,)
-    whole = Cascade((Preisach(surface), *behind))
-    ends = np.array(surface.drive_range[::-1])
-    saturated, (_, low) = whole.apply(whole.at_rest(), ends)
-    high = whole.apply(saturated, ends[:1])[1][0]
-    levels = np.linspace(low, high, count)
-    values = np.zeros((count, count))
-    for row in range(1, count):
-        there_and_back = np.concatenate([levels[row : row + 1], levels[:row][::-1]])
-        drive = whole.invert(saturated, there_and_back)[1]
-        values[row, :row] = 0.5 * (drive[0] - drive[:0:-1])
-    values, _ = grown(values, levels, DEFAULT_SETTINGS.least_slope)
-    return EverettSurface(float(low), float(high), values, surface.drive_range[0])
+    motions = [*every, *(_products(fit, *one) for one in scans(fit))]
+    moves = principal(fit, covariance, motions)
+    return variant_of(fit, np.zeros(fit.layout.size), 0.0), tuple(_along(fit, one) for one in moves)
 
 
-def nearest_surface(slopes: DuhemSlopes, settings: FitSettings) -> EverettSurface:
-    """Return the surface of plays that follow the reversal curves of one state best."""
-    turns = np.linspace(slopes.upper, slopes.lower, settings.direct_levels)[1:]
-    ends = np.full_like(turns, slopes.upper)
-    corners = np.concatenate([[0.0], ends[:1], np.column_stack([turns, ends]).ravel()])
-    places = np.arange(len(corners)) * settings.direct_levels
-    drive = np.interp(np.arange(places[-1] + 1), places, corners)
-    model, plays = Duhem(slopes), Plays(slopes.lower, slopes.upper, settings)
-    output = model.apply(model.at_rest(), drive)[1]
-    pieces = plays.pieces(
-        plays.unbent(), drive, np.arange(len(drive) + 1), plays.at_rest(np.zeros(1))[0]
-    )
-    columns = np.concatenate([one[:, : len(plays.thresholds)] for one in pieces]).astype(float)
-    density, _ = nnls(columns - columns.mean(axis=0), output - output.mean())
-    theta = np.zeros_like(plays.unbent())
-    theta[: len(density)] = density
-    theta[0] = max(theta[0], settings.least_slope)
-    return plays.surface(theta, mixed=True)
+def principal(fit: AxisFit, covariance: Array, motions: Sequence[Array]) -> Array:
+    """Moves of θ by a standard deviation in each direction that counts, (directions, size).
+
+    Each motion is given by its JᵀJ to any scale. The moves are longer by what others leave out.
+    """
+    settings = fit.layout.settings
+    values, vectors = np.linalg.eigh(covariance)
+    half = vectors * np.sqrt(np.maximum(values, 0.0))
+    whole = np.zeros_like(covariance)
+    for one in motions:
+        seen = half.T @ one @ half
+        if (variance := float(np.trace(seen))) > 0.0:
+            whole += seen / variance
+    values, vectors = np.linalg.eigh(whole)
+    held = np.cumsum(values[::-1]) / max(float(np.sum(values)), np.finfo(float).tiny)
+    count = int(np.searchsorted(held, 1.0 - settings.spread_left)) + 1
+    count = min(count, settings.spread_directions, len(held))
+    moves = (half @ vectors[:, ::-1][:, :count]).T
+    return np.asarray(moves / np.sqrt(held[count - 1]))
+
+
+def scans(fit: AxisFit) -> Iterator[tuple[Array, float]]:
+    """Yield drives (V), (n,), from depolarised rest, and their sample periods (s)."""
+    operator, settings = fit.layout.operator, fit.layout.settings
+    middle, quarter = 0.5 * (operator.lower + operator.upper), settings.scan_samples // 4
+    place = np.arange(9 * quarter + 1) / quarter
+    wave = np.interp(place, np.arange(10.0), [0.0, *2 * [0.0, 1.0, 0.0, -1.0], 0.0])
+    risen = np.minimum(place, 1.0)
+    longest = max(len(one.drive) * one.period for one in fit.records)
+    for period in (fit.shortest, longest / len(place)):
+        for halved in range(settings.spread_sizes):
+            drive = middle * risen + 0.5**halved * operator.half * wave
+            yield np.clip(drive, operator.lower, operator.upper), period
+
+
+def scan_from_rest(fit: AxisFit, drive: Array, period: float) -> Simulation:
+    """Simulate a drive (V), (n,), of a sample period (s) from the depolarised rest of the model."""
+    theta = fit.theta.copy()
+    theta[fit.layout.parts["rest"]] = rest_of(fit)
+    edges, still = np.arange(len(drive) + 1), np.zeros(len(drive))
+    given = "a scan", drive, still, period, 1, 0
+    record = Signals(*given, rested=True, noise=0.0, edges=edges)
+    return simulate(fit.layout, theta, record)
+
+
+def _products(fit: AxisFit, drive: Array, period: float) -> Array:
+    """JᵀJ of a drive (V) from rest, or of its last cycle about the mean where no record rested."""
+    simulation = scan_from_rest(fit, drive, period)
+    operator, edges = fit.layout.operator, simulation.record.edges
+    start, _ = fit.layout.at_rest(simulation.theta)
+    pieces = operator.pieces(fit.layout.of_operator(fit.theta), drive, edges, start)
+    rows = np.concatenate([one for _, one in jacobian(simulation, pieces)])
+    if any(one.rested for one in fit.records):
+        rows -= rows[0].copy()
+    else:
+        rows = rows[-fit.layout.settings.scan_samples :]
+        rows -= rows.mean(axis=0)
+    return np.asarray(rows.T @ rows)
+
+
+def _along(fit: AxisFit, move: Array) -> Variant:
+    """Return the effects a standard deviation along a move of θ, or as near to it as there are."""
+    deviations = 1.0
+    while deviations > np.finfo(np.float32).eps:
+        try:
+            return variant_of(fit, move, deviations)
+        except InputError:
+            deviations *= 0.5
+    raise InputError("the fit's own effects have no inverse, or are not stable")
+
+
+def lost_by(model: AxisModel, fit: AxisFit) -> float:
+    """Mean squared share by which scans of a model and of its fit differ, but for their mean.
+
+    The surface of the model has fewer levels than the plays have places, and where it does not grow
+    it is another. The last cycle counts.
+    """
+    lost, cycle = [], slice(-fit.layout.settings.scan_samples, None)
+    for drive, period in scans(fit):
+        cascade, own = forward(model, period), fit.gain * scan_from_rest(fit, drive, period).output
+        apart_by = cascade.apply(cascade.at_rest(), drive)[1] - own
+        lost.append(np.var(apart_by[cycle]) / np.var(own[cycle]))
+    return float(np.mean(lost))

@@ -72,7 +72,8 @@ class OneState:
     def precision(self, _name: str, scales: Mapping[str, float]) -> Array:
         """Third differences along both sides are small, and all slopes of order one."""
         rows, columns = self.shape[1:]
-        along, across = (_third(size) for size in (rows, columns))
+        thirds = (np.diff(np.eye(size), n=3, axis=0) for size in (rows, columns))
+        along, across = (each.T @ each for each in thirds)
         rough = np.kron(along, np.eye(columns)) + np.kron(np.eye(rows), across)
         bent = rough / scales["slopes"] ** 2 + np.eye(len(rough)) / self.settings.slopes**2
         return np.asarray(np.kron(np.eye(2), bent))
@@ -205,7 +206,7 @@ class OneState:
 
         At the highest w a path rises at most as steeply as the drive and falls at least so, at the
         lowest the other way round. Records that never go there tell nothing of these slopes, and w
-        would run away. Returns what ``Growth.lacking`` does.
+        would run away. Returns what ``Plays.lacking`` does.
         """
         tables, found, lacks = theta.reshape(self.shape), [], []
         for table, splines in enumerate(self._leaving()):
@@ -243,8 +244,3 @@ class OneState:
         ends = self.lower, self.upper
         offset = self.lower - float(rest[0])
         return DuhemSlopes(*ends, offset, 0.0, self.widths, slope, rising, falling)
-
-
-def _third(size: int) -> Array:
-    third = np.diff(np.eye(size), n=3, axis=0)
-    return np.asarray(third.T @ third)

@@ -20,7 +20,6 @@ from afm_scan_ros.core.effects.hysteresis.preisach import OutputMap
 from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.dynamics import PoleBank
-from afm_scan_ros.core.fit.growth import Growth
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -36,6 +35,11 @@ Mode: TypeAlias = tuple[float, float, float, float]
 
 SEARCHED = ("smooth_density", "rough_density", "correction", "output_map", "slopes", "creep")
 """Settings that bound standard deviations, which are those of the greatest evidence."""
+
+
+def first_scales(settings: FitSettings) -> dict[str, float]:
+    """Standard deviations at which the search for those of the greatest evidence begins."""
+    return {name: settings.first_scale * getattr(settings, name) for name in SEARCHED}
 
 
 @frozen(eq=False)
@@ -144,13 +148,9 @@ class Layout:
             result[self.delay_place] = self.least_delay
         return result
 
-    @cached_property
-    def _conditions(self) -> Growth | OneState:
-        return Growth(self.operator) if isinstance(self.operator, Plays) else self.operator
-
     def lacking(self, theta: Array) -> tuple[Array, Array]:
         """Conditions on the operator, where θ fails them: see ``lacking`` of each."""
-        rows, lacks = self._conditions.lacking(self.of_operator(theta))
+        rows, lacks = self.operator.lacking(self.of_operator(theta))
         return np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))), lacks
 
     def dynamics(self, theta: Array) -> PoleBank:
@@ -207,12 +207,8 @@ class Layout:
         result[self.parts["modes"]] = np.tile([0.0, 0.0, 1.0, 0.0], self.modes)
         return result
 
-    def of_any_gain(self, precision: Array) -> Array:
-        """Return a prior's precision without the condition that V(0) is one."""
-        return np.asarray(precision - self._unit_gain)
-
     @cached_property
-    def _unit_gain(self) -> Array:
+    def unit_gain(self) -> Array:
         """Precision of V(0) about one: to its order, or exactly where the operator has the gain."""
         exact = 1.0 if self.linear else float(np.finfo(np.float32).eps)
         return np.asarray(np.outer(self.static, self.static) / exact)
@@ -245,7 +241,7 @@ class Layout:
             known = np.arange(parts["map"].stop)
             matrix[known, known] += np.finfo(np.float32).eps ** -2.0
             mean[: parts["map"].start] = self.operator.unbent()
-        matrix += self._unit_gain
+        matrix += self.unit_gain
         mean[parts["lags"].start] = 1.0
         first, last = parts["modes"].start, parts["modes"].stop
         mean[first:last:4] = theta[first:last:4]

@@ -22,7 +22,6 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, grown, grown_beyond
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
 from afm_scan_ros.core.fit.stretches import Edges
 from afm_scan_ros.core.types import Array
@@ -300,83 +299,49 @@ class Plays:
         )
         return result
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Ends (V) of the Everett surface: as far to both sides as the range, where that holds 0 V.
+    @cached_property
+    def _branches(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Splines at u - r and at u + r at levels u of the range, (2, levels, plays, splines).
 
-        So the memory of depolarised rest is in the surface, also of a drive of one sign.
+        The second value is whether a play can have been pushed back before, (2, levels, plays).
         """
-        if not self.lower <= 0.0 <= self.upper:
-            return self.lower, self.upper
-        farthest = max(-self.lower, self.upper)
-        return -farthest, farthest
+        levels = np.linspace(self.lower, self.upper, self.settings.surface_levels)
+        thresholds = self.thresholds[self.thresholds <= self.half]
+        ways = np.array([-1.0, 1.0])[:, np.newaxis, np.newaxis]
+        places = levels[:, np.newaxis] + ways * thresholds
+        inside = np.clip(places, self.knots[2], self.knots[-3]).ravel()
+        splines = BSpline.design_matrix(inside, self.knots, 2).toarray().reshape(*places.shape, -1)
+        rises = np.array([levels - self.lower, self.upper - levels])
+        return splines, np.asarray(2.0 * thresholds <= rises[:, :, np.newaxis])
 
-    def levels(self, count: int) -> Array:
-        """Levels (V) of the Everett surface, ``count`` of them over the range."""
-        lower, upper = self.ends
-        whole = 1 + round((count - 1) * (upper - lower) / (self.upper - self.lower))
-        return np.linspace(lower, upper, whole)
+    def lacking(self, theta: Array) -> tuple[Array, Array]:
+        """Least S at each level where it is too small, as linear conditions on the weights.
 
-    def surface(
-        self, theta: Array, bias: float | None = None, *, mixed: bool = False
-    ) -> EverettSurface:
-        """Return E(alpha, beta), whose output at ``lower`` is that of all plays pushed down to it.
+        Once a drive u has turned, the plays up to some threshold R follow it, and A changes by
 
-        Its ``bias`` (V) is that of depolarised rest of an oscillation as large as half the range.
+            S(u, R) = Σ_{r ≤ R} T_r'(u ∓ r)    for each volt of a rise or a fall.
 
-        Plays that the surface cannot push both ways stay where they have settled. Where the surface
-        does not grow, as a fit that has not converged may leave it, it may be ``mixed`` with a
-        straight line so far that it does. Raises InputError where it does not.
+        Only a surface on which it is ``least_slope`` at least has an inverse. Returns the rows of
+        the conditions, shape (conditions, weights), and by how much each lacks, both over the
+        settings' ``slope_tolerance``: what lacks changes by minus the rows times a change of theta.
         """
-        levels = self.levels(self.settings.surface_levels)
-        values, offset = self.everett(theta, levels)
-        share = 0.0
-        if mixed:
-            values, share = self.growing(values, levels)
-        return self.surface_of(values, offset + share * (self.ends[0] - offset), bias)
-
-    def growing(self, values: Array, levels: Array) -> tuple[Array, float]:
-        """Return E (V) at levels (V) that grows, and the share of a straight line mixed in.
-
-        Beyond the range of the drive, which no record tells, it is never less steep than that line.
-        """
-        within = np.flatnonzero((levels >= self.lower) & (levels <= self.upper))
-        inside, result = slice(within[0], within[-1] + 1), values.copy()
-        least = self.settings.least_slope
-        result[inside, inside], share = grown(values[inside, inside], levels[inside], least)
-        return grown_beyond(result, inside, 0.5 * least * (levels[1] - levels[0])), share
-
-    def surface_of(self, values: Array, offset: float, bias: float | None) -> EverettSurface:
-        """Return the surface of ``everett``, with a ``bias`` (V) as that of ``surface``."""
-        lower, upper = self.ends
-        if bias is not None:
-            bias *= (0.5 * (upper - lower) / self.half) ** 2
-        wider = upper - lower > self.upper - self.lower
-        within = (self.lower, self.upper) if wider else None
-        return EverettSurface(lower, upper, values, offset, bias, within=within)
-
-    def everett(self, theta: Array, levels: Array) -> tuple[Array, float]:
-        """E (V) at levels (V), (n, n), whether it grows or not, and the output (V) at the first."""
-        values, offset, half = np.zeros((len(levels),) * 2), 0.0, 0.5 * (levels[-1] - levels[0])
-        each_play = zip(self.thresholds, self.settled, self.tables(theta), strict=True)
-        for r, settled, table in each_play:
-            if r > half:
-                offset += float(np.interp(settled, self.positions, table))
-                continue
-            top = levels[:, np.newaxis] - r
-            risen, fallen = (
-                self._continued(table, each) for each in (top, np.minimum(levels + r, top))
-            )
-            values += 0.5 * (risen - fallen)
-            offset += float(self._continued(table, levels[0] + r))
-        return np.tril(values, -1), offset
-
-    def _continued(self, table: Array, at: Array) -> Array:
-        """T_r at places (V): a table that goes on straight beyond the range, and does not fall."""
-        step = self.positions[1] - self.positions[0]
-        first, last = (max(float(table[i + 1] - table[i]), 0.0) / step for i in (0, -2))
-        below, above = np.minimum(at - self.lower, 0.0), np.maximum(at - self.upper, 0.0)
-        return np.asarray(np.interp(at, self.positions, table) + first * below + last * above)
+        (splines, follows), settings = self._branches, self.settings
+        count = follows.shape[2]
+        widths, blend = self.widths[:count], self.blend[:count]
+        density, correction = (each[:count] for each in self.weights(theta))
+        along = np.einsum("dlrs,rs->dlr", splines, correction)
+        slopes = np.cumsum(widths * (density + along), axis=2)
+        slopes[~follows] = np.inf
+        last, least = np.argmin(slopes, axis=2), slopes.min(axis=2)
+        places = np.argwhere(least < settings.least_slope)
+        rows = np.zeros((len(places), len(theta)))
+        for row, (way, level) in zip(rows, places, strict=True):
+            upto = slice(last[way, level] + 1)
+            row[upto] = widths[upto]
+            mixed = (widths[upto, np.newaxis] * blend[upto]).T @ splines[way, level, upto]
+            row[len(self.thresholds) :] = mixed[self.reached]
+        lacks = settings.least_slope - least[tuple(places.T)]
+        return rows / settings.slope_tolerance, lacks / settings.slope_tolerance
 
 
 @compiled

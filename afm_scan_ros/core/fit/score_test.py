@@ -19,11 +19,10 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from afm_scan_ros.core.fit.dynamics import Complex
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.parameters import Columns, Mode
-from afm_scan_ros.core.fit.sensitivity import pulled
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.fit.simulation import pulled
+from afm_scan_ros.core.types import Array, Complex
 
 Place: TypeAlias = tuple[float, float]
 """Angular frequency (rad/s) and damping."""
@@ -71,7 +70,7 @@ class ScoreTest:
         precision, mean = wider.layout.prior(fit.scales, wider.theta)
         apart = precision @ (wider.theta - mean)
         if not self.with_operator:
-            precision = wider.layout.of_any_gain(precision)
+            precision = precision - wider.layout.unit_gain
         whole = self._matrix + precision[np.ix_(within_wider, within_wider)]
         try:
             factor = cho_factor(layout.conditioned(whole))

@@ -28,16 +28,10 @@ class FitSettings:
         "twice the step doubles the error on fresh scans",
     )
     small_plays: int = setting(
-        9,
-        "1",
-        "thresholds in geometric steps up to two play_steps",
-        "each is 1.5 times the last",
+        9, "1", "thresholds in geometric steps up to two play_steps", "each is 1.5 times the last"
     )
     correction_plays: int = setting(
-        14,
-        "1",
-        "thresholds between which the correction is linear",
-        "the correction is smooth",
+        14, "1", "thresholds between which the correction is linear", "the correction is smooth"
     )
     correction_cells: int = setting(
         16,
@@ -46,10 +40,7 @@ class FitSettings:
         "densities of materials rise and fall over a tenth of the range: 6 leave 0.1 %",
     )
     surface_levels: int = setting(
-        161,
-        "1",
-        "levels of the model's Everett surface",
-        "one for each play_step over the range",
+        161, "1", "levels of the model's Everett surface", "one for each play_step over the range"
     )
     direct_levels: int = setting(
         41,
@@ -82,10 +73,7 @@ class FitSettings:
         "the maps about the operator are smooth",
     )
     slope_cells_state: int = setting(
-        12,
-        "1",
-        "cells of a Duhem operator's slopes over its state",
-        "in trials 10 were too coarse",
+        12, "1", "cells of a Duhem operator's slopes over its state", "in trials 10 were too coarse"
     )
     state_margin: float = setting(
         0.1,
@@ -100,10 +88,7 @@ class FitSettings:
         "the first errs by the change of the state over a sample",
     )
     least_slope: float = setting(
-        0.02,
-        "1",
-        "least slope dA/du of a model",
-        "only an output that grows has an inverse",
+        0.02, "1", "least slope dA/du of a model", "only an output that grows has an inverse"
     )
     slope_tolerance: float = setting(
         1e-5,
@@ -112,22 +97,13 @@ class FitSettings:
         "a thousandth of least_slope costs 2 nat",
     )
     map_terms: int = setting(
-        4,
-        "1",
-        "coefficients of the map behind the plays",
-        "polynomials up to the fifth degree",
+        4, "1", "coefficients of the map behind the plays", "polynomials up to the fifth degree"
     )
     density: float = setting(
-        2.0,
-        "1",
-        "standard deviation of the density of plays beforehand",
-        "slopes are of order 1",
+        2.0, "1", "standard deviation of the density of plays beforehand", "slopes are of order 1"
     )
     smooth_density: float = setting(
-        3.0,
-        "1",
-        "greatest standard deviation of the density's bends",
-        "slopes are of order 1",
+        3.0, "1", "greatest standard deviation of the density's bends", "slopes are of order 1"
     )
     rough_density: float = setting(
         0.3,
@@ -136,10 +112,7 @@ class FitSettings:
         "a tenth of the density",
     )
     correction: float = setting(
-        0.3,
-        "1",
-        "greatest standard deviation of the correction's bends",
-        "a tenth of the density",
+        0.3, "1", "greatest standard deviation of the correction's bends", "a tenth of the density"
     )
     output_map: float = setting(
         0.05,
@@ -148,10 +121,7 @@ class FitSettings:
         "stages bend by some 5 %",
     )
     slopes: float = setting(
-        5.0,
-        "1",
-        "greatest standard deviation of the slopes' bends",
-        "slopes are of order 1",
+        5.0, "1", "greatest standard deviation of the slopes' bends", "slopes are of order 1"
     )
     creep: float = setting(
         0.015,
@@ -160,10 +130,7 @@ class FitSettings:
         "creep is 1 to 10 % a decade, of eight time constants",
     )
     first_scale: float = setting(
-        0.1,
-        "1",
-        "share of the greatest values at which their search begins",
-        "a decade below",
+        0.1, "1", "share of the greatest values at which their search begins", "a decade below"
     )
     steepest_sensor: int = setting(
         4,
@@ -172,16 +139,10 @@ class FitSettings:
         "filters of instruments have 12 or 24 dB an octave",
     )
     lag_weight: float = setting(
-        0.1,
-        "static gain",
-        "standard deviation of the weight of a fast lag",
-        "lags correct modes",
+        0.1, "static gain", "standard deviation of the weight of a fast lag", "lags correct modes"
     )
     fast_lags: int = setting(
-        6,
-        "1",
-        "fast lags, evenly spaced in the logarithm",
-        "one lag leaves 0.3 % at 0.1 to 2 kHz",
+        6, "1", "fast lags, evenly spaced in the logarithm", "one lag leaves 0.3 % at 0.1 to 2 kHz"
     )
     unseen_lag: float = setting(
         1e-3,
@@ -208,10 +169,7 @@ class FitSettings:
         "twice the slowest lag, as no creep may be at the place of a lag",
     )
     fastest_creep: float = setting(
-        50.0,
-        "1/omega",
-        "fastest time constant of creep",
-        "a decade above the lags",
+        50.0, "1/omega", "fastest time constant of creep", "a decade above the lags"
     )
     creep_per_decade: int = setting(
         8,
@@ -220,10 +178,7 @@ class FitSettings:
         "one between two of them is then imitated to 0.5 % of its gain",
     )
     damping: float = setting(
-        0.02,
-        "1",
-        "damping of a mode beforehand",
-        "piezo stages have 0.003 to 0.1",
+        0.02, "1", "damping of a mode beforehand", "piezo stages have 0.003 to 0.1"
     )
     heaviest_mode: float = setting(
         3.0,
@@ -312,10 +267,7 @@ class FitSettings:
         "it then hides the loops; beyond its own band a straight line leaves as much",
     )
     most_modes: int = setting(
-        4,
-        "1",
-        "modes at most",
-        "each costs a fit, and stages show one to three",
+        4, "1", "modes at most", "each costs a fit, and stages show one to three"
     )
     slight: float = setting(
         5e-4,
@@ -330,10 +282,7 @@ class FitSettings:
         "the likelihood grows by more than steps foresee where the discrepancy falls",
     )
     stage_steps: int = setting(
-        4,
-        "1",
-        "steps of each stage before the last",
-        "a stage only has to start the next",
+        4, "1", "steps of each stage before the last", "a stage only has to start the next"
     )
     most_steps: int = setting(
         60,
@@ -372,10 +321,7 @@ class FitSettings:
         "M. K. Transtrum and J. P. Sethna, arXiv:1201.5885",
     )
     rows_at_once: int = setting(
-        1024,
-        "1",
-        "rows of derivatives that are made at a time",
-        "a processor's cache holds them",
+        1024, "1", "rows of derivatives that are made at a time", "a processor's cache holds them"
     )
     converged: float = setting(
         0.05,
@@ -389,12 +335,7 @@ class FitSettings:
         "probability that noise alone shows a tone in a record",
         "one record in a thousand",
     )
-    tone_most: int = setting(
-        8,
-        "1",
-        "tones in a record at most",
-        "mains with its harmonics",
-    )
+    tone_most: int = setting(8, "1", "tones in a record at most", "mains with its harmonics")
     tone_loud: float = setting(
         10.0,
         "1",
@@ -402,10 +343,7 @@ class FitSettings:
         "10 dB above the mean of an error's lines",
     )
     tone_side: int = setting(
-        4,
-        "1",
-        "bins from a line to where it has fallen by 30 dB",
-        "Hann's window",
+        4, "1", "bins from a line to where it has fallen by 30 dB", "Hann's window"
     )
     tone_fallen: float = setting(
         0.05,
@@ -414,16 +352,10 @@ class FitSettings:
         "13 dB, two bins of Hann's window",
     )
     slower_mains: float = setting(
-        50.0,
-        "Hz",
-        "mains, sought in records too short to show a tone",
-        "IEC 60038",
+        50.0, "Hz", "mains, sought in records too short to show a tone", "IEC 60038"
     )
     faster_mains: float = setting(
-        60.0,
-        "Hz",
-        "mains, sought in records too short to show a tone",
-        "IEC 60038",
+        60.0, "Hz", "mains, sought in records too short to show a tone", "IEC 60038"
     )
     tone_cycles: float = setting(
         10.0,
@@ -511,10 +443,7 @@ class FitSettings:
         "an operator hardly changes over a tenth of its range",
     )
     fewest_blocks: int = setting(
-        200,
-        "1",
-        "blocks of a record at least",
-        "a record has hundreds of parameters",
+        200, "1", "blocks of a record at least", "a record has hundreds of parameters"
     )
     seen_lines: int = setting(
         101,

@@ -5,12 +5,11 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
-from scipy.fft import irfft, rfft
 
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.measured_drive import without_noise
-from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS, FitSettings
+from afm_scan_ros.core.fit.noise import noise_of, without_noise
+from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.fit.stretches import Edges, averaged, smooth_edges
 from afm_scan_ros.core.intersample import HELD, INTERPOLATION, read_between, upsampling
 from afm_scan_ros.core.record import Record
@@ -129,21 +128,23 @@ class Signals:
 
         Until then it is what it was at the first sample. ``half_range`` is the operator's (V).
         """
-        drive = _later(self.given, samples)
         first = self.first + samples - self.late if self.first else 0
-        edges = edges_of(
-            drive, self.displacement, self.noise, self.block, first, half_range, settings
-        )
-        moved = evolve(self, drive=drive, edges=edges, first=first)
-        return evolve(moved, late=samples, recorded=self.given)
+        drive = _later(self.given, samples)
+        late = evolve(self, drive=drive, first=first, late=samples, recorded=self.given)
+        return late.stretched(half_range, settings)
 
     def read_after(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record as one whose displacement was read after its drive's updates."""
         if self.ahead:
             return self
-        drive = led(self.drive)
-        given = drive, self.displacement, self.noise, self.block, self.first, half_range, settings
-        return evolve(self, drive=drive, edges=edges_of(*given), ahead=True)
+        return evolve(self, drive=led(self.drive), ahead=True).stretched(half_range, settings)
+
+    def stretched(self, half_range: float, settings: FitSettings) -> "Signals":
+        """Return the record in the longest stretches of blocks over which it is smooth."""
+        both = averaged(self.drive, self.block), averaged(self.displacement, self.block)
+        quiet, begins = self.noise / np.sqrt(self.block), -(-self.first // self.block)
+        edges = smooth_edges(*both, quiet, half_range, begins, settings)
+        return evolve(self, edges=self.block * edges)
 
     def without_drive_noise(self, half_range: float, settings: FitSettings) -> "Signals":
         """Return the record with its drive less the noise with which that was measured."""
@@ -158,6 +159,30 @@ class Signals:
             if apart > bin_width and len(found) < most:
                 found.append(tone)
         return evolve(self, tones=tuple(found))
+
+
+@frozen(eq=False)
+class Free:
+    """What is free in one record, as linear regressors with their prior, and their products."""
+
+    columns: Array
+    products: Array
+    variance: float
+
+    @cached_property
+    def matrix(self) -> Array:
+        """H of the regressors, of which all but the offset have a prior of unit variance."""
+        prior = np.diag([0.0, *np.ones(len(self.products) - 1)])
+        return np.asarray(self.products / self.variance + prior)
+
+    def weights(self, signal: Array) -> Array:
+        """Weights of the regressors that explain a signal best."""
+        right = self.columns.T @ signal / self.variance
+        return np.asarray(np.linalg.solve(self.matrix, right))
+
+    def without(self, signal: Array) -> Array:
+        """Return a signal without what the regressors explain of it."""
+        return np.asarray(signal - self.columns @ self.weights(signal))
 
 
 def signals_of(
@@ -189,31 +214,15 @@ def signals_of(
     block = longest_block(drive, displacement, noise, settings, every)
     first = known_from(drive, settings, depolarised=record.depolarised or not remembers)
     first = first if first < settings.most_left_out * len(drive) else 0
-    edges = edges_of(drive, displacement, noise, block, first, half_range, settings)
     period, begun = record.sample_period / every, record.depolarised
-    every_sample = record.name, drive, displacement, period
-    held = record.intersample == HELD
-    return Signals(*every_sample, block, first, begun, noise, edges, upsampling=every, held=held)
+    given = record.name, drive, displacement, period, block, first, begun, noise
+    one, held = np.array([0, len(drive)], np.intp), record.intersample == HELD
+    return Signals(*given, one, upsampling=every, held=held).stretched(half_range, settings)
 
 
 def _later(drive: Array, samples: int) -> Array:
     """Return a drive (V), (n,), late by so many samples; at first it is what it began with."""
     return np.concatenate([np.full(samples, drive[0]), drive])[: len(drive)]
-
-
-def edges_of(
-    drive: Array,
-    displacement: Array,
-    noise: float,
-    block: int,
-    first: int,
-    half_range: float,
-    settings: FitSettings,
-) -> Edges:
-    """Edges (samples) of stretches of blocks over which a record is smooth; see ``Signals``."""
-    both = averaged(drive, block), averaged(displacement, block)
-    quiet, begins = noise / np.sqrt(block), -(-first // block)
-    return block * smooth_edges(*both, quiet, half_range, begins, settings)
 
 
 def steps_read_after(record: Record, settings: FitSettings) -> bool:
@@ -235,32 +244,6 @@ def steps_read_after(record: Record, settings: FitSettings) -> bool:
     seen, later = (float(change[steps] @ each[steps]) / size for each in (moved, following))
     noise = np.sqrt(2.0 / size) * noise_of(displacement, settings.finest)
     return bool(abs(seen) > max(settings.read_after * noise, 0.5 * abs(seen + later)))
-
-
-def noise_of(signal: Array, finest: float = DEFAULT_SETTINGS.finest) -> float:
-    """Standard deviation of the white noise in a signal, from third differences.
-
-    Their variance is 1 + 9 + 9 + 1 times that of the noise, and the median of the absolute value of
-    a normal variable is its standard deviation over 1.4826. It is at least what the ``finest``
-    converter resolves, as a share of the signal's range: a signal made by a formula has none.
-    """
-    third = np.diff(signal, 3)
-    robust = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
-    return float(max(robust, finest * float(np.ptp(signal))))
-
-
-def correlation_length(residual: Array) -> float:
-    """Samples of a residual (n,) that tell as much as one independent sample.
-
-    That is the integrated autocorrelation time, summed up to where the autocorrelation first falls
-    below that of noise, 2 / √n.
-    """
-    count = len(residual)
-    spectrum = np.abs(rfft(residual - residual.mean(), 2 * count)) ** 2
-    correlations = irfft(spectrum)[:count]
-    correlations /= max(correlations[0], np.finfo(float).tiny)
-    last = int(np.argmax(correlations < 2.0 / np.sqrt(count)))
-    return float(1.0 + 2.0 * correlations[1:last].sum())
 
 
 def longest_block(

@@ -11,8 +11,8 @@ import numpy as np
 from attrs import evolve, frozen
 from scipy.ndimage import uniform_filter1d
 
-from afm_scan_ros.core.fit.directions import variants
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.model_of_fit import variants
 from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.signals import Signals
 from afm_scan_ros.core.fit.uncertainty import covariance, information, of_records

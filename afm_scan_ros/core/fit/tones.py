@@ -7,12 +7,59 @@ mean about it exceeds ln(n / chance) with the probability ``chance``.
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from attrs import evolve
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
+from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.settings import FitSettings
+from afm_scan_ros.core.fit.stretches import averaged
 from afm_scan_ros.core.types import Array
+
+
+def free_tones(fit: AxisFit) -> bool:
+    """Let sines in the residuals be free in their records; return whether there are more.
+
+    They are sought anew each time, as one may have been what the model lacked. A record too short
+    to show a sine is tried for those of the others, and for mains.
+    """
+    settings, before = fit.layout.settings, sum(len(one.tones) for one in fit.records)
+    lefts = list(_with_tones(fit))
+    triples = zip(fit.records, lefts, fit.motions(), strict=True)
+    for k, (record, left, motion) in enumerate(triples):
+        drive = averaged(record.drive, record.block)[record.used]
+        found = find_tones(left, drive, motion, record.length, settings)
+        fit.records[k] = evolve(record, tones=()).with_tones(found, settings.tone_most)
+    known = {tone for record in fit.records for tone in record.tones}
+    known |= {settings.slower_mains, settings.faster_mains}
+    for k, left in enumerate(lefts):
+        record = fit.records[k]
+        lasts = record.length * len(record.mean)
+        hidden = [tone for tone in known if 1.0 < tone * lasts < settings.tone_cycles]
+        found = offered_tones(left, record.seconds, hidden, fit.variance(record), settings)
+        fit.records[k] = record.with_tones(found, settings.tone_most)
+    fit.weigh()
+    return sum(len(one.tones) for one in fit.records) > before
+
+
+def _with_tones(fit: AxisFit) -> Iterator[Array]:
+    """Yield what the model leaves of each record, its tones included, m."""
+    lefts = fit.left_of(fit.theta, gathered=False)
+    for k, (record, (left, without)) in enumerate(zip(fit.records, lefts, strict=True)):
+        free, first = fit.free_of(k, gathered=False), -4 * len(record.tones)
+        tones = free.columns[:, first:] @ free.weights(left)[first:] if first else 0.0
+        yield without + tones
+
+
+def tone_amplitudes(fit: AxisFit) -> Iterator[tuple[tuple[float, float], ...]]:
+    """Yield frequency (Hz) and amplitude (m), in the middle of each record, of its tones."""
+    lefts = fit.left_of(fit.theta, gathered=False)
+    for k, (record, (left, _)) in enumerate(zip(fit.records, lefts, strict=True)):
+        free = fit.free_of(k, gathered=False)
+        weights = free.weights(left)[len(free.columns.T) - 4 * len(record.tones) :]
+        sizes = record.motion * np.hypot(weights[0::4], weights[1::4])
+        yield tuple(zip(record.tones, map(float, sizes), strict=True))
 
 
 def find_tones(

@@ -11,8 +11,8 @@ from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.signal import welch
 
 from afm_scan_ros.core.fit.estimator import AxisFit
+from afm_scan_ros.core.fit.noise import correlation_length
 from afm_scan_ros.core.fit.parameters import Layout
-from afm_scan_ros.core.fit.signals import correlation_length
 from afm_scan_ros.core.types import Array
 
 

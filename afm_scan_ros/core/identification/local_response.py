@@ -13,9 +13,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
-from afm_scan_ros.core.types import Array
-
-Complex = NDArray[np.complex128]
+from afm_scan_ros.core.types import Array, Complex
 
 
 @frozen(eq=False)

@@ -1,26 +1,48 @@
-"""A model against a held-out record → the error that is known of it, by band."""
+"""How far a scanner may be from its model: by held-out records, and by the parameters of the fit.
 
-from collections.abc import Sequence
+The discrepancy of a record k is a share η_k of its motion m_k. Of a record that was held out it is
+what the model misses beyond the sensor's noise n_k and beyond what its parameters explain,
+
+    (η_k m_k)² = e_k² - n_k² - Σ_i var((y_i - y_c) / d_i),
+
+and of one that was fitted what the fit leaves beyond noise. In each band η² is the mean of the
+records held out that move there, or else of those fitted, or else the largest. Added are the
+squares of ``least_discrepancy`` and of what the model loses of the fit's own scans from rest, but
+for their mean.
+"""
+
+from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.fit.model_of_fit import lost_by
+from afm_scan_ros.core.fit.noise import noise_of
+from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.intersample import held_voltages, moved_by
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
-from afm_scan_ros.core.prediction import extended_axis
+from afm_scan_ros.core.prediction import apart, extended_axis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array
 
 REST = 500
 """Samples of rest at a record's start, or coefficients of a band, that give the sensor's noise."""
 DIGITS = 4
 """Digits of an rms that are kept: a band's few lines support no more."""
+PREDICTED = 0.02
+"""Share of a held-out record's motion up to which the model may differ."""
+
+Missed: TypeAlias = tuple[Array, float]
+"""Rms motion (m) of a record in each band, (bands,), and the squared share that is missed."""
 
 
 @frozen(eq=False)
@@ -38,10 +60,6 @@ class Validation:
         return misfit(self.residual)
 
 
-PREDICTED = 0.02
-"""Share of a held-out record's motion up to which the model may differ."""
-
-
 def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
     """Predict a record of one axis from depolarised rest, and compare it from a sample on.
 
@@ -54,9 +72,10 @@ def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
     voltages = held_voltages(drive, record.intersample)
     wider = extended_axis(model, voltages)
     _refuse_beyond(wider, voltages, record.name)
-    both = residual_of(wider, record), displacement
-    residual, moved = (signal[first:] - signal[first:].mean() for signal in both)
     period = record.sample_period
+    predicted = moved_by(partial(forward, wider), drive, period, record.intersample)
+    both = displacement - predicted, displacement
+    residual, moved = (signal[first:] - signal[first:].mean() for signal in both)
     bands = band_edges(period, resonance_of(model.vibration, period))
     sensor = _noise(drive, displacement, residual, bands)
     of_bands = sensor * np.sqrt(np.diff(bands) / bands[-1])
@@ -69,13 +88,6 @@ def validate_from(model: AxisModel, record: Record, first: int) -> Validation:
         displacement=_rounded(motion),
     )
     return Validation(record.name, residual, period, known)
-
-
-def residual_of(model: AxisModel, record: Record) -> Array:
-    """Displacement (m) of a record of one axis less that predicted from depolarised rest, (n,)."""
-    drive, displacement = record.signals(record.axes[0])
-    moved = moved_by(partial(forward, model), drive, record.sample_period, record.intersample)
-    return np.asarray(displacement - moved)
 
 
 def of_fitted(known: ModelDiscrepancy, share: float) -> ModelDiscrepancy:
@@ -123,3 +135,49 @@ def _description(name: str, drive: Array, period: float, noise: float) -> str:
 
 def _rounded(values: Array) -> tuple[float, ...]:
     return tuple(float(f"{value:.{DIGITS}g}") for value in values)
+
+
+def spread_of(
+    known: Knowledge, model: AxisModel, held_out: Sequence[tuple[Record, Validation]]
+) -> Spread:
+    """Return how far the scanner may be from the model of its fit.
+
+    Records of one axis were ``held_out``, and count where their validation begins.
+    """
+    period = known.fit.shortest
+    bands = band_edges(period, resonance_of(model.vibration, period))
+    rest_known = any(one.rested for one in known.fit.records)
+    spread = Spread(*known.variants(), bands, np.zeros(len(bands) - 1), rest_known)
+    least = known.fit.layout.settings.least_discrepancy
+    fitted = list(_missed_by_fit(known, bands))
+    shares = _mean_by_band(fitted, np.full(len(bands) - 1, max(squared for _, squared in fitted)))
+    shares = _mean_by_band([_left_out(model, spread, *one) for one in held_out], shares)
+    return evolve(spread, shares=np.sqrt(least**2 + lost_by(model, known.fit) + shares))
+
+
+def _missed_by_fit(known: Knowledge, bands: Sequence[float]) -> Iterator[Missed]:
+    """Yield what the fit leaves of its records beyond noise."""
+    for one, left in zip(known.fit.records, known.fit.residuals(), strict=True):
+        beyond = max(float(np.mean(left**2)) - one.noise**2 / one.block, 0.0)
+        yield rms_by_band(one.displacement, bands, one.period), beyond / one.motion**2
+
+
+def _left_out(model: AxisModel, spread: Spread, record: Record, seen: Validation) -> Missed:
+    """What the model leaves of a record beyond noise and beyond what its parameters explain."""
+    drive, displacement = record.signals(record.axes[0])
+    part, period = slice(len(drive) - len(seen.residual), None), record.sample_period
+    each = apart(model, spread, drive, period, intersample=record.intersample)
+    explained = np.var(each[:, part], axis=1).sum()
+    error = float(np.var(seen.residual)) - noise_of(seen.residual) ** 2
+    squared = max(error - float(explained), 0.0) / float(np.var(displacement[part]))
+    return rms_by_band(displacement[part], spread.bands, period), squared
+
+
+def _mean_by_band(records: Sequence[Missed], otherwise: Array) -> Array:
+    """Mean squared share (bands,) of the records that move in a band, or what it is otherwise."""
+    moving = np.zeros((len(records), len(otherwise)))
+    for row, (moved, _) in zip(moving, records, strict=True):
+        row[places_moved(moved)] = 1.0
+    count = moving.sum(axis=0)
+    total = np.array([squared for _, squared in records]) @ moving
+    return np.where(count > 0.0, total / np.maximum(count, 1.0), otherwise)

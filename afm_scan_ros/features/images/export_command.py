@@ -8,9 +8,8 @@ import numpy as np
 
 from afm_scan_ros.bag.folder import bag_files
 from afm_scan_ros.bag.mcap_file import runs
-from afm_scan_ros.bag.monitored import IMAGE, heights, way_of
 from afm_scan_ros.bag.reader import ScanRecording, read_scan
-from afm_scan_ros.bag.typestore import decode
+from afm_scan_ros.bag.typestore import IMAGE, decode, heights, way_of
 from afm_scan_ros.cli.options import NEW_FILE, RECORD, refuse_existing, topic_option, warn
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.errors import InputError, ScanError
@@ -30,7 +29,7 @@ from afm_scan_ros.files import PACKAGE, version
 from afm_scan_ros.files.columns import Signal, write_signals
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.report.analysis import scan_spec
-from afm_scan_ros.report.provenance import UNSTATED, source_of
+from afm_scan_ros.report.page import UNSTATED, source_of
 from afm_scan_ros.report.terminal import say
 
 TEXT, NETCDF = ".csv", ".nc"

@@ -29,9 +29,9 @@ from afm_scan_ros.features.images.report import (
     not_separated,
 )
 from afm_scan_ros.features.images.scan_image import ScanImage
-from afm_scan_ros.report.effect_status_text import intervals_text, status_text
 from afm_scan_ros.report.page import CommandLine
 from afm_scan_ros.report.paper import paper_figure, save
+from afm_scan_ros.report.sentences import intervals_text, status_text
 from afm_scan_ros.report.terminal import say
 
 PER_MICROMETRE = 1e6

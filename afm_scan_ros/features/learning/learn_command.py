@@ -25,13 +25,12 @@ from afm_scan_ros.features.learning.report import (
     learning_text,
     taught_text,
 )
-from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.drive_files import save_learned
 from afm_scan_ros.files.model_file import load_model, save_model
 from afm_scan_ros.files.plant_file import load_scan
-from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.nodes.parameters import FLOW
 from afm_scan_ros.report.diagnosis_json import save_diagnosis
-from afm_scan_ros.report.page import CommandLine
-from afm_scan_ros.report.provenance import Provenance, heading_lines, provenance_of
+from afm_scan_ros.report.page import CommandLine, Provenance, heading_lines, provenance_of
 from afm_scan_ros.report.table import show
 from afm_scan_ros.report.terminal import say
 
@@ -122,7 +121,6 @@ def _taught(
 def _next_commands(
     spec: Path, model: Path, driven: DrivenScanner, out: Path
 ) -> Iterator[CommandLine]:
-    """Yield what to do with what was learned."""
     files = ["--spec", spec, "--model", model, *driven.options]
     yield CommandLine(
         "Make the same scan with the correction.",

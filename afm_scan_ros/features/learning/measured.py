@@ -20,7 +20,7 @@ from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, ProgressCallback, Step, Trace
 from afm_scan_ros.features.learning.loop import SCANS, LearningScan, best_of
 from afm_scan_ros.features.learning.loop import learn as learning_scans
-from afm_scan_ros.files.learned_file import save_learned
+from afm_scan_ros.files.drive_files import save_learned
 from afm_scan_ros.files.paths import path_of
 from afm_scan_ros.model import UNLIMITED, Model
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from attrs import frozen
@@ -14,12 +15,14 @@ from afm_scan_ros.features.learning.loop import LearningScan, best_of
 from afm_scan_ros.report.diagnosis_json import Document
 from afm_scan_ros.report.diagnosis_text import effects as effects_text
 from afm_scan_ros.report.diagnosis_text import next_steps, verdict_text
-from afm_scan_ros.report.page import CommandLine, ReportPage, Section
+from afm_scan_ros.report.page import CommandLine, Provenance, ReportPage, Section
 from afm_scan_ros.report.picture import BLUE, NANO, ORANGE, Curve, Panel, Picture
-from afm_scan_ros.report.provenance import Provenance
 from afm_scan_ros.report.quantity import nanometres, percent
 from afm_scan_ros.report.scan_pictures import TwoScans, error_picture
+from afm_scan_ros.report.sentences import Catalogue
 from afm_scan_ros.report.table import Part, Rows
+
+said = Catalogue(Path(__file__).parent / "templates" / "sentences.yaml")
 
 HEADINGS = (
     "scan",
@@ -68,39 +71,24 @@ def learning_text(scans: Sequence[LearningScan]) -> Iterator[Part]:
     yield Rows(HEADINGS, learning_rows(scans))
     best, first = best_of(scans), scans[0]
     for axis in AXES:
-        yield (
-            f"{axis}: measured error {nanometres(first.errors[axis])} nm rms before,"
-            f" {nanometres(best.errors[axis])} nm in the best scan, number"
-            f" {scans.index(best) + 1}."
-        )
+        errors = {"first": first.errors[axis], "best": best.errors[axis]}
+        yield said("learning.reached", axis=axis, number=scans.index(best) + 1, **errors)
     yield from _limits(scans)
 
 
 def _limits(scans: Sequence[LearningScan]) -> Iterator[str]:
     """Yield what did not repeat, what was restored, and what the drive's limits refused."""
     tests = [done.convergence for done in scans if done.convergence]
-    for axis in AXES:
-        if tests and tests[-1][axis].noise > 0.5 * scans[0].errors[axis]:
-            yield (
-                f"{axis}: the first two scans differ by as much as their error. Learn again when"
-                " the scanner has settled, or with less noise."
-            )
-        if tests:
-            last = tests[-1][axis]
-            yield (
-                f"{axis}: {nanometres(last.noise)} nm rms do not repeat from scan to scan. The"
-                f" correction contains {nanometres(last.learned_noise)} nm rms of it."
-            )
+    for axis, last in (tests[-1] if tests else {}).items():
+        if last.noise > 0.5 * scans[0].errors[axis]:
+            yield said("learning.unsettled", axis=axis)
+        yield said("learning.noise", axis=axis, last=last)
     for number, done in enumerate(scans, 1):
         if done.restored:
-            yield (
-                f"After scan {number - 1} the error of {' and '.join(done.restored)} had grown in"
-                " some frequencies. There the best correction was restored and is kept."
-            )
-        if math.isinf(done.price):
-            yield f"Scan {number} keeps the correction before it: the drive's limits leave no room."
-        elif done.price:
-            yield f"Scan {number} has less than the whole correction, as the drive is limited."
+            yield said("learning.restored", number=number - 1, axes=done.restored)
+        if done.price:
+            code = "no_room" if math.isinf(done.price) else "limited"
+            yield said(f"learning.{code}", number=number)
 
 
 def taught_text(taught: Taught) -> Iterator[Part]:
@@ -108,11 +96,8 @@ def taught_text(taught: Taught) -> Iterator[Part]:
     yield from verdict_text(taught.diagnosis)
     yield from effects_text(taught.diagnosis)
     for axis in AXES:
-        yield (
-            f"{axis}: of the learned drive's displacement the model lacks"
-            f" {nanometres(taught.before[axis])} nm rms, and the extended model"
-            f" {nanometres(taught.after[axis])} nm."
-        )
+        rms = {"before": taught.before[axis], "after": taught.after[axis]}
+        yield said("learning.lacking", axis=axis, **rms)
 
 
 def learning_document(scans: Sequence[LearningScan], taught: Taught | None) -> Document:
@@ -130,15 +115,6 @@ def learning_document(scans: Sequence[LearningScan], taught: Taught | None) -> D
             "lacking_rms_after_m": dict(taught.after),
         }
     return document
-
-
-METHOD = (
-    "The first two scans have one drive. Their difference is what does not repeat. Each later scan"
-    " has a corrected reference. All limits of the drive hold for it. The error is achieved minus"
-    " desired displacement, rms about zero, without the first line. A frequency is learned where"
-    " the response is known well enough that its error cannot grow, with a probability of 95 %. The"
-    " bound on the next error follows from it."
-)
 
 
 def learning_report(
@@ -165,25 +141,21 @@ def learning_report(
         answer=list(_answer(scans, best)),
         picture=error_picture("lines", compared),
         next_steps=[*commands, *(next_steps(taught.diagnosis) if taught else ())],
-        evidence=[*sections, Section("Method", [METHOD])],
-        warnings=[f"Learning ended early: {failure}."] if failure else [],
+        evidence=[*sections, Section("Method", [said("learning.method")])],
+        warnings=[said("learning.ended", why=failure)] if failure else [],
         provenance=of,
     )
 
 
 def _answer(scans: Sequence[LearningScan], best: LearningScan) -> Iterator[str]:
     first = scans[0]
-    errors = [
-        f"from {nanometres(first.errors[axis])} to {nanometres(best.errors[axis])} nm rms in {axis}"
-        for axis in AXES
-    ]
-    yield f"The learned correction changes the measured error {' and '.join(errors)}."
+    errors = {axis: (first.errors[axis], best.errors[axis]) for axis in AXES}
+    yield said("learning.changed", errors=errors)
     tests = [done.convergence for done in scans if done.convergence]
     if tests:
-        noise = [f"{nanometres(tests[-1][axis].noise)} nm rms in {axis}" for axis in AXES]
-        yield f"What does not repeat from scan to scan is {' and '.join(noise)}."
+        yield said("learning.repeats", tests=tests[-1])
     else:
-        yield f"The best is scan {scans.index(best) + 1} of {len(scans)}."
+        yield said("learning.best", number=scans.index(best) + 1, count=len(scans))
 
 
 def history_picture(scans: Sequence[LearningScan]) -> Picture:
@@ -214,16 +186,12 @@ def spectrum_picture(done: LearningScan) -> Picture:
         corrections.append(Curve(hertz, amplitude, axis, colour, dots=True))
         ratio = np.abs(step.response.ratio[used])
         responses.append(Curve(hertz, ratio, axis, colour, dots=True))
-    caption = (
-        "Left: the correction by frequency. Right: response of the scanner over its model, as the"
-        " scans show it, where a correction was learned."
-    )
     label = "frequency in Hz"
     row = [
         Panel(corrections, label, "correction in nm", log="xy"),
         Panel(responses, label, "scanner over model", log="xy"),
     ]
-    return Picture("spectrum", caption, [row])
+    return Picture("spectrum", said("learning.spectrum"), [row])
 
 
 def _scan(done: LearningScan) -> Document:

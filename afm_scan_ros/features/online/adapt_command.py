@@ -90,7 +90,6 @@ def adapt(
 
 
 def _rows(axis: str, state: AxisState) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each parameter."""
     for name, finding in state.findings.items():
         value, unchanged = (getattr(shift, name) for shift in (state.shift, AxisShift()))
         dead_zone = PER_UNKNOWN.get(name, 1.0) * finding.dead_zone

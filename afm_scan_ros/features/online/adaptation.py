@@ -136,7 +136,6 @@ class AxisAdaptation:
         return state if lines < self._first else self._decided(state)
 
     def _decided(self, state: AxisState) -> AxisState:
-        """Change what has changed."""
         known = np.append(state.unknowns[:HYSTERESIS], 0.0) + state.baseline
         kept = np.append(known[:HYSTERESIS], 0.0)
         found = estimate(state.information, kept, AT_LIMIT * self._by_error)

@@ -168,7 +168,6 @@ def survey_bag(assigned: Assignment) -> Recording:
 
 @lru_cache(maxsize=16)
 def _model(file: str, digest: str) -> Model:
-    """Load a model, once for each content."""
     del digest
     return load_model(file)
 

@@ -10,13 +10,11 @@ from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.features.survey.recording import Recording
+from afm_scan_ros.features.survey.recording import QUANTITIES, Recording
 from afm_scan_ros.files.paths import replacing, write_text
 from afm_scan_ros.files.records import from_mapping, to_mapping
 
 TABLE, ROWS = "survey.parquet", "recordings"
-QUANTITIES = ("gain", "resonance", "damping", "creep", "residual_ratio")
-"""Estimates of an axis in the table, each with its interval: NAME_AXIS, and _low and _high."""
 
 
 def require_parquet() -> None:
@@ -89,6 +87,7 @@ def _schema(pa: Any) -> Any:  # noqa: ANN401 - the module is of an extra
 
 
 def _axis_columns() -> list[str]:
+    """Name the columns; each estimate has its interval: NAME_AXIS, and _low and _high."""
     ends = [f"{name}_{{}}{end}" for name in QUANTITIES for end in ("", "_low", "_high")]
     columns = ["detection_limit_{}_m", "residual_{}_m", *ends]
     return [column.format(axis) for axis in AXES for column in columns]

@@ -10,24 +10,24 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.features.survey.changes import Change, Course, by_instrument, courses
-from afm_scan_ros.features.survey.recording import RESIDUAL, EffectValue, NamedEffect, Recording
+from afm_scan_ros.features.survey.recording import (
+    QUANTITIES,
+    RESIDUAL,
+    EffectValue,
+    NamedEffect,
+    Recording,
+)
 from afm_scan_ros.report import picture
-from afm_scan_ros.report.page import CommandLine, Listing, ReportPage, Section
-from afm_scan_ros.report.provenance import UNSTATED
+from afm_scan_ros.report.page import UNSTATED, CommandLine, Listing, ReportPage, Section
 from afm_scan_ros.report.quantity import nanometres, quantity, significant
 from afm_scan_ros.report.scan_pictures import LOW
+from afm_scan_ros.report.sentences import Catalogue
 from afm_scan_ros.report.table import Part, Rows
 
-NANO = 1e-9
+said = Catalogue(Path(__file__).parent / "templates" / "sentences.yaml")
+
 PLACE = "{instrument}"
 """What stands for an instrument in the name of a model's file."""
-QUANTITIES = {
-    "gain": "gain of {}",
-    "resonance": "first resonance of {}",
-    "damping": "damping ratio of {}",
-    "creep": "creep of {}",
-    "residual_ratio": "residual of {} over its detection limit",
-}
 SURVEYED = ("instrument", "recordings", "not diagnosed", "verdicts", "result")
 
 
@@ -62,12 +62,15 @@ class Survey:
 def alert(changes: Sequence[Change]) -> str:
     """Say in a line what changed of an instrument, the surest change first."""
     first, *others = changes
-    also = f"; also {', '.join(map(_what, others))}" if others else ""
-    named = f"; diagnosis: {', '.join(first.effects)}" if first.effects else ""
-    when = f"between {_time(first.after)} and {_time(first.before)}"
-    return (
-        f"alert: {first.instrument}: {_what(first)} changed by a factor of {_factor(first)},"
-        f" {when}{also}{named}"
+    return said(
+        "survey.alert",
+        instrument=first.instrument,
+        what=_what(first),
+        factor=_factor(first),
+        after=_time(first.after),
+        before=_time(first.before),
+        others=[_what(each) for each in others],
+        effects=first.effects,
     )
 
 
@@ -75,22 +78,13 @@ def summary(found: Survey) -> Iterator[Part]:
     """Yield what was surveyed, and an alert for each instrument that changed."""
     yield found.instruments
     for each in found.failed:
-        yield f"{each.bag} was not diagnosed: {each.error}"
+        yield said("survey.not_diagnosed", of=each)
     for each in found.recordings:
         if not each.error and not each.recorded:
-            yield f"{each.bag} states no time, so no trend has it"
+            yield said("survey.no_time", of=each)
     yield from map(alert, found.changed.values())
 
 
-METHOD = (
-    "Each recording is diagnosed alone. In addition, the gain, the first resonance, its damping"
-    " ratio and the gains of creep are estimated together, each divided by the model's. The"
-    " estimates assume that no other effect is there. The residual is the rms over the bands of"
-    " residual divided by detection limit. A series has changed if its means before and after some"
-    " time differ by more than its scatter or the model's error. A survey of unchanged instruments"
-    " reports a change with a probability of {:.3g} at most. A diagnosis may name no effect where"
-    " the series shows a change: it sees one recording alone."
-)
 CHANGES = ("instrument", "what changed", "by a factor of", "between", "and", "diagnosis")
 LISTED = (
     "recording", "instrument", "time", "verdict", "effects", "residual over limit",
@@ -111,6 +105,8 @@ def survey_report(
     versions = sorted({each.version for each in recordings})
     models = sorted({each.model for each in recordings})
     changes = [Rows(CHANGES, [_change_row(each) for each in found.changes])]
+    when = f"{now:%Y-%m-%dT%H:%M:%SZ}"
+    written = said("survey.written", when=when, versions=versions)
     listing = Listing(LISTED, [_listed(each, reports) for each in recordings], SHOWN)
     return ReportPage(
         title="Survey of recordings",
@@ -121,14 +117,8 @@ def survey_report(
             Section("Recordings", [listing], opened=True),
             *([Section("Changes", changes)] if found.changes else []),
             Section("Instruments", [found.instruments]),
-            Section("Method", [METHOD.format(found.false_alarm)]),
-            Section(
-                "Provenance",
-                [
-                    f"Written {now:%Y-%m-%dT%H:%M:%SZ} by afm_scan_ros {', '.join(versions)}.",
-                    f"SHA-256 of the model's files: {', '.join(models)}",
-                ],
-            ),
+            Section("Method", [said("survey.method", false_alarm=found.false_alarm)]),
+            Section("Provenance", [written, said("survey.models", models=models)]),
         ],
     )
 
@@ -136,13 +126,9 @@ def survey_report(
 def _answer(found: Survey) -> Iterator[str]:
     """Yield how many instruments changed and which, or that none did."""
     count = len(list(by_instrument(found.recordings)))
-    failed = f", of which {len(found.failed)} could not be diagnosed" if found.failed else ""
-    yield (
-        f"{len(found.changed)} of {count} instruments changed, by {len(found.recordings):,}"
-        f" recordings{failed}."
-    )
+    yield said("survey.changed", found=found, count=count)
     for some in list(found.changed.values())[:1]:
-        yield f"The surest: {alert(some).removeprefix('alert: ')}."
+        yield said("survey.surest", alert=alert(some).removeprefix("alert: "))
 
 
 def _next(found: Survey, model: str) -> Iterator[str | CommandLine]:
@@ -150,14 +136,9 @@ def _next(found: Survey, model: str) -> Iterator[str | CommandLine]:
         of_it = (r for r in found.recordings if r.instrument == name)
         bags = [r.bag for r in of_it if r.recorded >= some[0].before][:2]
         file = model.replace(PLACE, name)
-        yield CommandLine(
-            f"Find out what changed of {name}, by recordings after the change together.",
-            ["diagnose", *bags, "--model", file, "--out", f"{name}_diagnosis"],
-        )
-    yield (
-        "Go on as recordings come in, with a report of each: give the command of this survey again,"
-        " with --reports and --watch."
-    )
+        words = ["diagnose", *bags, "--model", file, "--out", f"{name}_diagnosis"]
+        yield CommandLine(said("survey.diagnose", name=name), words)
+    yield said("survey.go_on")
 
 
 def _change_row(change: Change) -> tuple[str, ...]:
@@ -201,12 +182,7 @@ def _trends(found: Survey) -> picture.Picture | None:
         ]
         for instrument in ordered
     }
-    caption = (
-        "Points are the values of the recordings, over the model's. Bars are 95 % intervals: dark"
-        " by the sensor's noise alone, light with the model's error, which recordings of the same"
-        " scan share. The grey line is the model, or the detection limit. Orange is the time of a"
-        " change (95 % credible interval)."
-    )
+    caption = said("survey.trends")
     return picture.Picture("trends", caption, variants[ordered[0]], LOW, variants=variants)
 
 
@@ -230,7 +206,7 @@ def _value_text(value: EffectValue) -> str:
 
 
 def _what(change: Change) -> str:
-    return QUANTITIES[change.name].format(change.axis)
+    return said(f"quantity.{change.name}", axis=change.axis)
 
 
 def _factor(change: Change) -> str:
@@ -241,7 +217,7 @@ def _factor(change: Change) -> str:
 
 
 def _time(stamp: int) -> str:
-    return f"{datetime.fromtimestamp(NANO * stamp, UTC):%Y-%m-%d %H:%M}" if stamp else UNSTATED
+    return f"{datetime.fromtimestamp(1e-9 * stamp, UTC):%Y-%m-%d %H:%M}" if stamp else UNSTATED
 
 
 def _trend(
@@ -265,10 +241,9 @@ def _trend(
         picture.Curve(times, values, "", picture.BLUE, dots=True),
     ]
     over = "over its limit" if name == RESIDUAL else "over the model's"
-    title = QUANTITIES[name].format(axis)
+    title = said(f"quantity.{name}", axis=axis)
     return picture.Panel(marks, "time", over, title, level=1.0, dates=True)
 
 
 def _dates(*stamps: int) -> NDArray[np.datetime64]:
-    """Times as a figure's axis has them."""
     return np.array(stamps, dtype="datetime64[ns]")

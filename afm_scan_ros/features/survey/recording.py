@@ -44,6 +44,8 @@ STEP = 0.01
 DETERMINED = 0.5
 """Posterior over prior standard deviation from which on a recording tells nothing of a value."""
 RESIDUAL = "residual_ratio"
+QUANTITIES = ("gain", "resonance", "damping", "creep", RESIDUAL)
+"""Names of the estimates of an axis."""
 
 
 @frozen

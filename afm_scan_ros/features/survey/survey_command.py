@@ -204,7 +204,6 @@ def survey(  # noqa: PLR0913 - click hands over one parameter an option
 
 
 def _surveyed(surveyor: Surveyor, paths: Sequence[Path]) -> Survey:
-    """Survey what there is."""
     given = found_bags(paths)
     if not given:
         raise InputError(f"{', '.join(map(str, paths))}: holds no bag: give bags, or their folders")

@@ -21,11 +21,19 @@ from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import LineError
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.link import Message
-from afm_scan_ros.features.view import kinds
-from afm_scan_ros.features.view.handover import Handover
+from afm_scan_ros.features.view.handover import (
+    BLOCK,
+    DOING,
+    ENDED,
+    LINE,
+    NODES,
+    PIPELINE,
+    SAY,
+    SCAN,
+    Handover,
+)
 from afm_scan_ros.features.view.priority import run_after
-from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW, refuse
+from afm_scan_ros.features.view.viewer import WINDOW, ViewSettings, refuse
 
 _RUN = "from afm_scan_ros.features.view.process import main; main(*sys.argv[1:])"
 
@@ -40,7 +48,7 @@ class Feed:
     def doing(self, what: str) -> None:
         """Hear what is done before the scan begins."""
         self._listener.doing(what)
-        self._handover.news(Message(kinds.DOING, {"what": what}))
+        self._handover.news(Message(DOING, {"what": what}))
 
     def moved(self, sample: int, total: int) -> None:
         """Hear how far the scan is; the viewer sees that by its blocks."""
@@ -49,16 +57,16 @@ class Feed:
     def say(self, news: str) -> None:
         """Hear what the user should know."""
         self._listener.say(news)
-        self._handover.news(Message(kinds.SAY, {"text": news}))
+        self._handover.news(Message(SAY, {"text": news}))
 
     def block(self, name: str, block: Trace) -> None:
         """Take the next block of a stream."""
         where = {"name": name, "first_sample": block.first_sample}
-        self._handover.block(Message(kinds.BLOCK, where, np.stack([block.x, block.y])))
+        self._handover.block(Message(BLOCK, where, np.stack([block.x, block.y])))
 
     def line(self, name: str, figures: LineError) -> None:
         """Take the figures of a line that the viewer does not compute itself."""
-        self._handover.news(Message(kinds.LINE, {"name": name, "figures": asdict(figures)}))
+        self._handover.news(Message(LINE, {"name": name, "figures": asdict(figures)}))
 
 
 @contextmanager
@@ -66,21 +74,21 @@ def beside_pipeline(
     settings: ViewSettings, where: str, info: ScanInfo, listener: ScanListener
 ) -> Iterator[Feed]:
     """Show a scan of this process while it runs."""
-    with _viewing(kinds.PIPELINE, where, settings, listener) as handover:
-        handover.news(Message(kinds.SCAN, {"info": encode_info(info).hex()}))
+    with _viewing(PIPELINE, where, settings, listener) as handover:
+        handover.news(Message(SCAN, {"info": encode_info(info).hex()}))
         try:
             yield Feed(handover, listener)
         except BaseException as error:
             why = str(error) or "interrupted"
-            handover.last = Message(kinds.ENDED, {"state": "failed", "reason": why})
+            handover.last = Message(ENDED, {"state": "failed", "reason": why})
             raise
-        handover.last = Message(kinds.ENDED, {"state": "done", "reason": ""})
+        handover.last = Message(ENDED, {"state": "done", "reason": ""})
 
 
 @contextmanager
 def beside_nodes(settings: ViewSettings, where: str, listener: ScanListener) -> Iterator[None]:
     """Show what the nodes of a scan publish while it runs."""
-    with _viewing(kinds.NODES, where, settings, listener):
+    with _viewing(NODES, where, settings, listener):
         yield
 
 

@@ -6,8 +6,14 @@ from contextlib import suppress
 from threading import Condition, Thread
 
 from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.features.view import kinds
-from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import ViewSettings
+
+SCAN, BLOCK, LINE, DOING, SAY, ENDED = "scan", "block", "line", "doing", "say", "ended"
+LEFT_OUT = "left_out"
+"""Kinds of messages from a scan to the viewer's process."""
+PIPELINE, NODES = "pipeline", "nodes"
+"""What is shown: what comes over the link, or what nodes publish until the link closes."""
+MISSING = "left out of this view, which was behind, not of the bag"
 
 
 class Handover:
@@ -73,7 +79,7 @@ class Handover:
                 self._changed.wait()
             if self._left_out:
                 count, self._left_out = self._left_out, 0
-                return Message(kinds.LEFT_OUT, {"count": count})
+                return Message(LEFT_OUT, {"count": count})
             if self._news:
                 return self._news.popleft()
             message = self._blocks.popleft()

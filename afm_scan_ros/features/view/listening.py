@@ -12,16 +12,15 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from afm_scan_ros.bag.monitored import WAYS, heights, line_of
 from afm_scan_ros.bag.scan_info import info_from_message
-from afm_scan_ros.bag.typestore import Message
+from afm_scan_ros.bag.typestore import WAYS, Message, heights, line_of
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, monitor_step
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.features.view.kinds import MISSING
+from afm_scan_ros.features.view.handover import MISSING
 from afm_scan_ros.features.view.screen import ERROR, Screen, open_screen
-from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW
+from afm_scan_ros.features.view.viewer import WINDOW, ViewSettings
 from afm_scan_ros.nodes import topics
+from afm_scan_ros.nodes.middleware import OF_VIEWERS
 from afm_scan_ros.nodes.peers import DONE, FAILED, RUNNING
 from afm_scan_ros.nodes.run import join
 
@@ -31,7 +30,7 @@ CURVES = {DESIRED: "desired", ACHIEVED: "achieved", ERROR: "error", DRIVE: "driv
 
 def listen(where: str, settings: ViewSettings, wanted: Callable[[], bool]) -> None:
     """Show scan after scan as long as it is ``wanted``; in a file, the first alone."""
-    join([])
+    join([], OF_VIEWERS)
     try:
         node, executor = Node(f"afm_scan_view_{os.getpid()}"), SingleThreadedExecutor()
         shown = ShownNodes(where, settings)

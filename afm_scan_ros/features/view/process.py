@@ -13,11 +13,20 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.streams import ACHIEVED, LineError, end
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.features.view import kinds
 from afm_scan_ros.features.view.blocks import ShownBlocks
+from afm_scan_ros.features.view.handover import (
+    BLOCK,
+    DOING,
+    ENDED,
+    LEFT_OUT,
+    LINE,
+    MISSING,
+    NODES,
+    SAY,
+    SCAN,
+)
 from afm_scan_ros.features.view.screen import Screen, open_screen
-from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import WINDOW, open_window
+from afm_scan_ros.features.view.viewer import WINDOW, ViewSettings, open_window
 
 SCAN_PART = "scan"
 """Name of what is a scan in one process, in the table of states."""
@@ -34,7 +43,7 @@ def main(descriptor: str, source: str, where: str) -> None:
             os.utime(sys.stdout.fileno())  # the sign that this process goes on
             return viewer is None or viewer.poll() is None
 
-        if source == kinds.NODES:
+        if source == NODES:
             from afm_scan_ros.features.view.listening import listen  # noqa: PLC0415 - needs ROS
 
             listen(where, settings, lambda: wanted() and not _is_over(link))
@@ -59,7 +68,7 @@ def show_link(link: Link, where: str, settings: ViewSettings, wanted: Callable[[
     shown = None
     for messages in _batches(link, settings.refresh):
         for message in messages:
-            if message.kind == kinds.SCAN:
+            if message.kind == SCAN:
                 info = decode_info(bytes.fromhex(message.fields["info"]))
                 shown = ShownPipeline(open_screen(info, where, settings), settings.pixels)
             elif shown is not None:
@@ -102,32 +111,32 @@ class ShownPipeline:
     def take(self, message: Message) -> None:
         """Show what a message tells."""
         fields = message.fields
-        if message.kind == kinds.BLOCK:
+        if message.kind == BLOCK:
             first = fields["first_sample"]
             block = Trace(first, self.screen.info.sample_period, *message.samples)
             self._blocks.add(fields["name"], block)
             if fields["name"] == ACHIEVED:
                 self._sample = end(block)
                 self._state("running", "")
-        elif message.kind == kinds.LINE:
+        elif message.kind == LINE:
             self.screen.line(fields["name"], LineError(**fields["figures"]))
-        elif message.kind == kinds.DOING:
+        elif message.kind == DOING:
             self._state("ready", fields["what"])
-        elif message.kind == kinds.ENDED:
+        elif message.kind == ENDED:
             self._is_over = True
             self._state(fields["state"], fields["reason"])
             why = fields["reason"]
             ended = f"the scan has failed: {why}" if why else "the scan is done"
             self.screen.say(ended, self._sample, "WARN" if why else "INFO")
-        elif message.kind == kinds.SAY:
+        elif message.kind == SAY:
             self.screen.say(fields["text"], self._sample)
-        elif message.kind == kinds.LEFT_OUT:
-            self.screen.say(f"{fields['count']} blocks or news are {kinds.MISSING}", self._sample)
+        elif message.kind == LEFT_OUT:
+            self.screen.say(f"{fields['count']} blocks or news are {MISSING}", self._sample)
 
     def end(self) -> None:
         """Show the last of it, and say where that is not the end of the scan."""
         if not self._is_over:
-            why = f"what follows is {kinds.MISSING}"
+            why = f"what follows is {MISSING}"
             self._state("no longer shown", why)
             self.screen.say(why, self._sample)
         self.screen.refresh(last=True)

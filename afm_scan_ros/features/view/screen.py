@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED, DRIVE, LineError
 from afm_scan_ros.core.types import AXES, Array
-from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import LOOPBACK, WINDOW, ports
+from afm_scan_ros.features.view.viewer import LOOPBACK, WINDOW, ViewSettings, ports
 from afm_scan_ros.files.units import UNITS
 
 ERROR = "error"

@@ -11,11 +11,11 @@ import click
 from afm_scan_ros.cli.execution import nodes_can_run
 from afm_scan_ros.cli.options import RECORD, warn
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.features.view.settings import ViewSettings
 from afm_scan_ros.features.view.viewer import (
     FILE_SUFFIX,
     WINDOW,
     Viewer,
+    ViewSettings,
     open_window,
     ports,
     refuse,
@@ -83,7 +83,7 @@ def _opened(
 
 
 def _show_bag(bag: Path, where: str, settings: ViewSettings, wanted: Callable[[], bool]) -> None:
-    from afm_scan_ros.features.view.recorded import show_bag  # noqa: PLC0415 - imports the viewer
+    from afm_scan_ros.features.view.blocks import show_bag  # noqa: PLC0415 - imports the viewer
 
     warn(show_bag(bag, where, settings, wanted))
     if where != WINDOW:

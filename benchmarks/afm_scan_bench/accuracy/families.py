@@ -8,7 +8,7 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FAMILIES, MAPS, FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
+from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.report.table import Row, Table
 
 SHARES, RATES = (0.2, 0.4, 0.9), (1.0, 5.0, 30.0)

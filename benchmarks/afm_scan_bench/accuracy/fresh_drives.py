@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from afm_scan_ros.core.identification.drives.waveforms import Waypoints, whole
+from afm_scan_ros.core.identification.drives.waveforms import waypoints
 from afm_scan_ros.core.types import Array
 
 SAMPLE_RATE = 20e3
@@ -60,4 +60,4 @@ def _moves(levels: Array) -> Array:
     path = np.concatenate([[0.0], levels, [0.0]])
     seconds = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)) / SPEED + BLEND)])
     samples = np.rint(seconds * SAMPLE_RATE)
-    return whole(Waypoints(1.0 / SAMPLE_RATE, path, samples, BLEND * SAMPLE_RATE))
+    return waypoints(path, samples, BLEND * SAMPLE_RATE)

@@ -13,7 +13,7 @@ import afm_scan_ros as afm
 from afm_scan_bench.families.operators import LIMIT
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_ros.core.identification.drives.excitation import excitation_block, validation_plan
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table

@@ -12,8 +12,7 @@ from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.in_process import calibrate_in_process
 from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
-from afm_scan_ros.core.identification.identify import identify_records
+from afm_scan_ros.core.identification.identify import identify_axis, identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.report.table import Row, Table

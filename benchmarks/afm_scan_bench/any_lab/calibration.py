@@ -11,8 +11,8 @@ from afm_scan_bench.accuracy.coverage import clopper_pearson
 from afm_scan_bench.any_lab.effects import EVERY
 from afm_scan_bench.any_lab.outcomes import RESULTS, DiagnosisOutcome, names_of
 from afm_scan_bench.diagnosis.unmodelled.summary import counted
+from afm_scan_ros.report.paper import blank, styled
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE
-from afm_scan_ros.report.style import blank, styled
 from afm_scan_ros.report.table import Row, Table
 
 CLEAR, AGAIN = 3.0, 1.2

@@ -15,7 +15,7 @@ import afm_scan_ros as afm
 from afm_scan_bench.any_lab.protocols import PROTOCOLS, raised, taken
 from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, draw
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
+from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.prediction import apart, discrepancy
 from afm_scan_ros.core.types import Array

@@ -14,7 +14,7 @@ from scipy.stats import f as f_distribution
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
 from afm_scan_bench.scans import spec_at
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of

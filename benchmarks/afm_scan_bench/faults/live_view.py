@@ -25,8 +25,7 @@ from afm_scan_ros.cli.execution import how_scans_run
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.streams import end
 from afm_scan_ros.core.types import AXES, Array
-from afm_scan_ros.features.view.settings import ViewSettings
-from afm_scan_ros.features.view.viewer import PORT_VARIABLE, serving
+from afm_scan_ros.features.view.viewer import PORT_VARIABLE, ViewSettings, serving
 from afm_scan_ros.report.table import Row, Table
 
 TRIALS = 20

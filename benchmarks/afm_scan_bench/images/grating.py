@@ -25,8 +25,8 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.images.outcomes import FIGURES, VARIANTS, Outcome, outcomes
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import GREY
-from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Row, Table
 
 SEEDS = range(50)

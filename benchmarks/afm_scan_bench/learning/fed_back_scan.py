@@ -15,7 +15,7 @@ from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.features.online.line_correction import lines_of_delay
 from afm_scan_ros.features.online.line_feedback import FedBack
-from afm_scan_ros.nodes.flow import block_size_at
+from afm_scan_ros.nodes.parameters import block_size_at
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from afm_scan_bench.measured.reversal_curve import ReversalCurve
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE
-from afm_scan_ros.report.style import styled
 
 KILO, MILLI, MICRO = 1e3, 1e-3, 1e-6
 

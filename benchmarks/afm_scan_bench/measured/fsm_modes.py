@@ -6,8 +6,8 @@ from scipy.stats import t
 
 from afm_scan_bench.measured.mirror.figure import fitted
 from afm_scan_bench.measured.mirror.recordings import AMPLITUDES, REALISATIONS
-from afm_scan_ros.core.identification.state_space.model import Mode, StateSpaceModel, modes
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel, modal_form
+from afm_scan_ros.core.types import Array, Complex
 from afm_scan_ros.report.table import Table
 
 RESONANT = 0.1
@@ -26,6 +26,40 @@ COLUMNS = {
     "damping_300_percent": ("300 mV", ".2f"),
     "damping_interval_percent": ("±", ".2f"),
 }
+
+
+@frozen(eq=False)
+class Mode:
+    """A vibration: ``frequency`` in Hz, at which it would swing undamped, and damping ratio.
+
+    ``left`` (p,) and ``right`` (m,): how it shows in the outputs and is driven, of length 1.
+    """
+
+    frequency: float
+    damping: float
+    left: Complex
+    right: Complex
+
+    def likeness(self, other: "Mode") -> float:
+        """1 where both have the same shape in inputs and outputs, 0 where they share nothing."""
+        shapes = np.vdot(self.left, other.left) * np.vdot(self.right, other.right)
+        return float(np.abs(shapes))
+
+
+def modes(model: StateSpaceModel) -> tuple[Mode, ...]:
+    """Return the vibrations, from the slowest: one for each pair of complex poles."""
+    form = modal_form(model.a, model.b, model.c, model.d)
+    rates = np.log(form.poles) / model.sample_period
+    lefts, rights = (
+        shape / np.linalg.norm(shape, axis=1, keepdims=True) for shape in (form.left, form.right)
+    )
+    return tuple(
+        Mode(float(np.abs(rate) / (2.0 * np.pi)), float(-rate.real / np.abs(rate)), left, right)
+        for rate, left, right in sorted(
+            zip(rates, lefts, rights, strict=True), key=lambda term: float(np.abs(term[0]))
+        )
+        if 0.0 < rate.imag * model.sample_period < np.pi
+    )
 
 
 @frozen(eq=False)

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 import afm_scan_ros as afm
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, LIGHT_ORANGE
-from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Row, Table
 
 SAMPLE_RATE = 610.35

@@ -9,8 +9,8 @@ from afm_scan_bench.paper.ripple import LinePath
 from afm_scan_bench.paper.scanner import PaperScan, paper_spec, scan_as_paper
 from afm_scan_bench.paper.section import Compared, Drawn, Section
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import STYLE, styled
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE
-from afm_scan_ros.report.style import STYLE, styled
 
 LINE_RATE = 30.0
 LINES = 128

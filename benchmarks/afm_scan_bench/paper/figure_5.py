@@ -14,8 +14,8 @@ from afm_scan_ros.core.model import AxisModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.report.fit_page import COHERENCE
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, LIGHT_BLUE
-from afm_scan_ros.report.style import styled
 
 POINTS = 2000
 TEXT = (

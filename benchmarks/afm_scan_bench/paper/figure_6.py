@@ -9,8 +9,8 @@ from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.report.paper import STYLE, styled
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE
-from afm_scan_ros.report.style import STYLE, styled
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 PERIOD = 0.01

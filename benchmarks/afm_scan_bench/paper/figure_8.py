@@ -12,8 +12,8 @@ from afm_scan_bench.scans import SEED, default_model
 from afm_scan_ros.core.identification.records.recording import misfit
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import STYLE, styled
 from afm_scan_ros.report.picture import BLUE, GREY, ORANGE
-from afm_scan_ros.report.style import STYLE, styled
 
 MILLI = 1e3
 EXACT, DIRECT = "exact", "direct (the paper's)"

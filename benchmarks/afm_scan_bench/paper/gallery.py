@@ -9,8 +9,8 @@ from matplotlib.image import AxesImage
 
 from afm_scan_bench.paper.picture import GRATING, Picture
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import ORANGE
-from afm_scan_ros.report.style import styled
 
 MICRO, NANO = 1e6, 1e9
 TALLEST = 160.0

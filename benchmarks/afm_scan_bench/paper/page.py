@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.paper.section import Section
 from afm_scan_ros.report.page import filled
-from afm_scan_ros.report.style import styled
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.table import Rows
 
 HEADINGS = ("", "paper", "ours")

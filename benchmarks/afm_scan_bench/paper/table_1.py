@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from afm_scan_bench.accuracy import table1
 from afm_scan_bench.paper.section import Compared, Drawn, Section
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, ORANGE
-from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Row
 
 PAPERS_CHOICE = 3

@@ -5,6 +5,7 @@ import os
 import pytest
 
 from afm_scan_bench.measured import fsm_noise
+from afm_scan_bench.measured.fsm_modes import modes
 from afm_scan_bench.measured.mirror.figure import ORDER, fitted
 from afm_scan_bench.measured.mirror.recordings import (
     identified,
@@ -14,7 +15,6 @@ from afm_scan_bench.measured.mirror.recordings import (
     squares,
 )
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.model import modes
 from afm_scan_ros.files import share_directory
 
 DATA = os.environ.get("AFM_SCAN_DATA") or str(share_directory().parent / "shared/data")

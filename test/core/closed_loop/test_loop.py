@@ -13,7 +13,6 @@ from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.record import Record
@@ -116,7 +115,7 @@ class Counting(InProcessSession):
 
     asked: list[str] = field(factory=list)
 
-    def experiment(self, plan: Plan[Waveform]) -> Record:
+    def experiment(self, plan: Plan) -> Record:
         """Remember the name; do not move."""
         self.asked.append(plan.name)
         return evolve(super().experiment(EXPERIMENTS["rest"].plan()), name=plan.name)

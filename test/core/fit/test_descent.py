@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.fit.descent import _metric, bounded, settle, step
+from afm_scan_ros.core.fit.descent import _metric, bounded, cover, settle, step
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import layout_of
@@ -99,10 +99,10 @@ def test_tables_stay_where_others_would_lose_what_a_step_gained() -> None:
     moved = GAIN * simulate(layout, theta, signals(drive, drive, 1)).output
     fit = AxisFit(layout, [signals(drive, moved, 1)], GAIN, theta, 1e-5)
     before = fit.objective(theta)
-    assert fit.cover(1.0) == 0.0
+    assert cover(fit, 1.0) == 0.0
     assert fit.layout is layout
     assert fit.theta is theta
-    lost = fit.cover(np.inf)
+    lost = cover(fit, np.inf)
     assert lost > 1.0
     assert fit.objective(fit.theta) == pytest.approx(before + lost)
     assert fit.layout.operator != operator

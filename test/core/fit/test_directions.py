@@ -5,12 +5,11 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.fit.directions import principal, scans, variants
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.model_of_fit import model_of, variant_of
+from afm_scan_ros.core.fit.model_of_fit import model_of, principal, scans, variant_of, variants
 from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.told import Knowledge
-from afm_scan_ros.core.identification.spread_of_fit import spread_of
+from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import Status
 from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.types import Array

@@ -9,17 +9,18 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.alternatives import with_one_state
 from afm_scan_ros.core.fit.axis import fit_axis
-from afm_scan_ros.core.fit.descent import settle
+from afm_scan_ros.core.fit.descent import evidence, settle
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.evidence import evidence, first_scales
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.parameters import layout_of
+from afm_scan_ros.core.fit.parameters import first_scales, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
 from afm_scan_ros.core.fit.simulation import simulate
+from afm_scan_ros.core.fit.surfaces import everett_surface
 from afm_scan_ros.core.fit.told import Knowledge
+from afm_scan_ros.core.fit.tones import free_tones
 from afm_scan_ros.core.fit.uncertainty import covariance
-from afm_scan_ros.core.identification.spread_of_fit import spread_of
+from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.scanner import forward
@@ -88,7 +89,7 @@ def test_the_model_rests_where_the_plays_do(bias: float) -> None:
     of_model = model_of(AxisFit(layout, records, gain, theta)).hysteresis.surface
     given, start = layout.of_operator(theta), layout.at_rest(theta)[0]
     expected = layout.operator.output(given, np.zeros(1), start)[0]
-    plane = evolve(of_model, offset=layout.operator.surface(given).offset)
+    plane = evolve(of_model, offset=everett_surface(layout.operator, given).offset)
     assert abs(expected) > 1e-3 * LIMIT
     assert Preisach(plane).at_rest().now[1] == pytest.approx(expected, abs=1e-8 * LIMIT)
 
@@ -149,9 +150,9 @@ def test_a_record_too_short_for_hum_takes_it_from_another() -> None:
     assert PERIOD * len(short) * 50.02 < SETTINGS.tone_cycles
     fit = AxisFit(layout, both, GAIN, theta)
     fit.weigh()
-    assert fit.find_tones()
+    assert free_tones(fit)
     assert [one.tones for one in fit.records] == [pytest.approx([50.02], abs=0.03)] * 2
-    assert not fit.find_tones()
+    assert not free_tones(fit)
     assert [one.tones for one in fit.records] == [pytest.approx([50.02], abs=0.03)] * 2
 
 

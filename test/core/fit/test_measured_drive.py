@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.fit.measured_drive import turns_of, white_noise_of, without_noise
+from afm_scan_ros.core.fit.noise import turns_of, white_noise_of, without_noise
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import LIMIT, SETTINGS
 

@@ -10,9 +10,8 @@ from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.growth import Growth
-from afm_scan_ros.core.fit.model_of_fit import from_rest
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
+from afm_scan_ros.core.fit.surfaces import everett_surface, from_rest
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import GAIN, LIMIT, SETTINGS, levels, of_plays_alone
 
@@ -34,7 +33,7 @@ def test_the_plays_are_the_surface_of_the_model(drive: Array) -> None:
     theta = np.concatenate([density, 0.02 * rng.standard_normal(terms)])
     value = 0.1
     bias, _ = bank.bias(np.array([value]))
-    model = Preisach(bank.surface(theta, bias))
+    model = Preisach(everett_surface(bank, theta, bias))
     of_model = model.apply(model.at_rest(), drive)[1]
     of_plays = bank.output(theta, drive, rest(bank, value))
     assert np.ptp(of_model - of_plays) < 3e-4 * np.ptp(of_plays)
@@ -63,7 +62,7 @@ def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float
     bank = PlayBank(low, high)
     theta = bank.unbent()
     theta[: bank.parts["density"]] = np.linspace(0.9, 0.3, bank.parts["density"])
-    surface, _ = from_rest(bank.surface(theta), None)
+    surface, _ = from_rest(everett_surface(bank, theta), None)
     model = Preisach(surface)
     assert model.at_rest().now[1] == pytest.approx(0.0, abs=1e-12)
     path = np.interp(np.arange(700), np.arange(0, 701, 100), [0, high, low, high, 1, 3, 0.5, 2])
@@ -76,21 +75,21 @@ def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float
 def test_conditions_tell_where_a_surface_does_not_grow(seed: int, low: float) -> None:
     """They are linear in the weights, and none fails where the model has an inverse."""
     rng, plays = np.random.default_rng(seed), PlayBank(low, LIMIT)
-    growth, theta = Growth(plays), plays.unbent()
+    theta = plays.unbent()
     theta[1:] = rng.normal(0.0, 10.0 ** rng.uniform(-2.0, 0.5), theta.size - 1)
-    rows, lacks = growth.lacking(theta)
+    rows, lacks = plays.lacking(theta)
     if len(lacks) == 0:
-        plays.surface(theta)
+        everett_surface(plays, theta)
         return
     least = SETTINGS.least_slope / SETTINGS.slope_tolerance
     if lacks.max() > 1.01 * least:
         with pytest.raises(InputError, match="does not grow"):
-            plays.surface(theta)
-    mixed = plays.surface(theta, mixed=True)
+            everett_surface(plays, theta)
+    mixed = everett_surface(plays, theta, mixed=True)
     lowest = 2.0 * np.diff(mixed.values, axis=0)[np.tri(len(mixed.values), dtype=bool)[:-1]].min()
     assert lowest / np.diff(mixed.levels)[0] > 0.99 * SETTINGS.least_slope
     move = 1e-9 * rng.standard_normal(theta.size)
-    _, moved = growth.lacking(theta + move)
+    _, moved = plays.lacking(theta + move)
     np.testing.assert_allclose(moved - lacks, -rows @ move, atol=1e-6 * least)
 
 
@@ -102,15 +101,15 @@ def test_plays_that_no_surface_has_are_held_to_one() -> None:
     theta[1 : len(operator.thresholds)] = 0.5
     theta[12:20] = -12.0
     with pytest.raises(InputError, match="does not grow"):
-        operator.surface(theta)
+        everett_surface(operator, theta)
     moved = GAIN * operator.output(theta, drive, rest(operator))
     fit = AxisFit(*of_plays_alone(drive, moved))
     settle(fit, 20, ("density", "correction"))
     with pytest.raises(InputError, match="does not grow"):
-        operator.surface(fit.layout.of_operator(fit.theta))
+        everett_surface(operator, fit.layout.of_operator(fit.theta))
     fit.grows = True
     settle(fit, 20, ("density", "correction"))
-    found = operator.surface(fit.layout.of_operator(fit.theta))
+    found = everett_surface(operator, fit.layout.of_operator(fit.theta))
     assert found.output_upper > found.output_lower
 
 
@@ -121,7 +120,7 @@ def test_a_model_of_any_range_moves_from_rest_as_its_plays_do(seed: int, low: fl
     rng, plays = np.random.default_rng(seed), PlayBank(low, LIMIT)
     theta = plays.unbent()
     theta[1 : len(plays.thresholds)] = rng.uniform(0.0, 0.6, len(plays.thresholds) - 1)
-    surface, _ = from_rest(plays.surface(theta), None)
+    surface, _ = from_rest(everett_surface(plays, theta), None)
     assert surface.drive_range == (low, LIMIT)
     model = Preisach(surface)
     turns = rng.uniform(low, LIMIT, 8)

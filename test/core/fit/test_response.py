@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from afm_scan_ros.core.fit.dynamics import Complex, PoleBank
-from afm_scan_ros.core.fit.response import respond
+from afm_scan_ros.core.fit.dynamics import (
+    PoleBank,
+    respond,
+)
 from afm_scan_ros.core.fit.stretches import means
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 PERIOD, COUNT = 1e-4, 400
 NONE = np.zeros(0, complex)

@@ -11,8 +11,7 @@ from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.one_state import OneState
 from afm_scan_ros.core.fit.parameters import Layout, layout_of
 from afm_scan_ros.core.fit.plays import Plays as PlayBank
-from afm_scan_ros.core.fit.sensitivity import jacobian, pulled
-from afm_scan_ros.core.fit.simulation import simulate
+from afm_scan_ros.core.fit.simulation import jacobian, pulled, simulate
 from afm_scan_ros.core.fit.stretches import means
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (

@@ -7,11 +7,10 @@ from scipy import signal
 import afm_scan_ros as afm
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.noise import correlation_length, noise_of
 from afm_scan_ros.core.fit.signals import (
-    correlation_length,
     known_from,
     longest_block,
-    noise_of,
     steps_read_after,
 )
 from afm_scan_ros.core.types import Array

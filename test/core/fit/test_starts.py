@@ -5,8 +5,8 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.core.fit.axis import fit_axis
+from afm_scan_ros.core.fit.candidates import begun_at_rest
 from afm_scan_ros.core.fit.estimator import AxisFit
-from afm_scan_ros.core.fit.starts import begun_at_rest
 from helpers.fit_cases import GAIN, displaced, levels, of_plays, of_plays_alone, record
 
 

@@ -4,11 +4,11 @@ import numpy as np
 from attrs import evolve
 
 from afm_scan_ros.core.fit.alternatives import with_one_state
+from afm_scan_ros.core.fit.candidates import rest_of
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.one_state import OneState
-from afm_scan_ros.core.fit.starts import rest_of
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import GAIN, LIMIT, levels, of_bouc_wen, of_plays_alone, signals
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from afm_scan_ros.core.fit.stretch_filter import StretchFilter
-from afm_scan_ros.core.fit.stretches import Edges, means
+from afm_scan_ros.core.fit.stretches import Edges, StretchFilter, means
 from afm_scan_ros.core.types import Array
 
 PERIOD = 1e-4

@@ -5,9 +5,9 @@ import pytest
 from scipy import signal
 
 from afm_scan_ros.core.identification.drives.excitation import creep_plan, hysteresis_plan
-from afm_scan_ros.core.identification.drives.waveforms import Multisine, random_phase_waves, whole
+from afm_scan_ros.core.identification.drives.waveforms import multisine, random_phase_waves
 from afm_scan_ros.core.identification.findings import Hum
-from afm_scan_ros.core.identification.fitted_axis import identify_axis
+from afm_scan_ros.core.identification.identify import identify_axis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
@@ -43,9 +43,9 @@ def records(modes: Modes, rate: float, highest: float, hum: float) -> list[Recor
     amplitudes = np.minimum(1.0, 0.1 * lines[-1] / lines)
     waves = 0.5 * random_phase_waves(lines, amplitudes, period, phases)
     return [
-        moved("creep", whole(slow.x), slow.sample_period, modes),
-        moved("frequency", whole(Multisine(1.0 / rate, waves, 6)), 1.0 / rate, modes, hum),
-        moved("hysteresis", whole(loops.x), loops.sample_period, modes),
+        moved("creep", slow.x, slow.sample_period, modes),
+        moved("frequency", multisine(waves, 6), 1.0 / rate, modes, hum),
+        moved("hysteresis", loops.x, loops.sample_period, modes),
     ]
 
 

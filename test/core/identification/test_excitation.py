@@ -11,8 +11,8 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (
     PLANS,
     excitation_block,
-    hysteresis_plan,
 )
+from afm_scan_ros.core.identification.drives.waveforms import waypoints
 from afm_scan_ros.core.identification.records.recording import checked
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Trace
@@ -80,6 +80,6 @@ def test_the_slowest_moves_between_levels_do_not_strike_the_resonance(axis: str)
 
 
 def test_every_level_is_reached_exactly() -> None:
-    plan = hysteresis_plan(limit=3.0).y
-    at_turns = plan.voltage(plan.samples)
-    np.testing.assert_allclose(at_turns, plan.levels, rtol=0.0, atol=1e-12)
+    levels, samples = np.array([0.0, 1.5, -2.0, 0.0]), np.array([0.0, 100.0, 350.0, 600.0])
+    drive = waypoints(levels, samples, blend=20.0)
+    np.testing.assert_allclose(drive[samples.astype(int)], levels, rtol=0.0, atol=1e-12)

@@ -19,7 +19,7 @@ from afm_scan_ros.core.identification.findings import (
     NotValidated,
     UncertainScan,
 )
-from afm_scan_ros.core.identification.fitted_axis import FittedAxis, identify_axis
+from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.core.model import ParameterInterval, Status
 from afm_scan_ros.core.prediction import apart, discrepancy
 from afm_scan_ros.core.record import Record

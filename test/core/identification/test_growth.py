@@ -28,7 +28,6 @@ from afm_scan_ros.core.identification.drives.proposal import (
     coverage,
     propose,
 )
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.axis import RationalSpec
 from afm_scan_ros.simulation.scanner import PlantSpec
@@ -111,7 +110,7 @@ def proposed(identifies: str, have: Coverage = KNOWN) -> ProposedRecord:
 
 
 def grown(record: ProposedRecord, plant: PlantSpec, limits: MotionLimits = LIMITS) -> list[Watched]:
-    def drive(plan: Plan[Waveform], _: object) -> tuple[Trace, Trace]:
+    def drive(plan: Plan, _: object) -> tuple[Trace, Trace]:
         return drive_through(plan, plant, seed=1)
 
     return list(grow(record, drive, limits, KNOWN))

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from afm_scan_ros.core.identification.drives.waveforms import Multisine, whole
-from afm_scan_ros.core.identification.records.periods import is_periodic, repeated_part, repetition
+from afm_scan_ros.core.identification.drives.waveforms import multisine
+from afm_scan_ros.core.identification.records.kinds import is_periodic, repeated_part, repetition
 from afm_scan_ros.core.types import Array
 
 
@@ -16,7 +16,7 @@ def drive_of(period: int, seed: int) -> Array:
     spectrum = np.zeros((3, period // 2 + 1), dtype=np.complex128)
     lines = np.arange(2, period // 4)
     spectrum[:, lines] = np.exp(2j * np.pi * rng.random((3, len(lines)))) / lines
-    return whole(Multisine(1e-4, period * np.fft.irfft(spectrum, period), 6))
+    return multisine(period * np.fft.irfft(spectrum, period), 6)
 
 
 @settings(max_examples=25, deadline=None)

@@ -12,7 +12,6 @@ from afm_scan_ros.core.identification.drives.proposal import (
     coverage,
     propose,
 )
-from afm_scan_ros.core.identification.drives.waveforms import whole
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.types import Array
 
@@ -40,7 +39,7 @@ def test_drives_keep_the_limits_and_rest_at_zero(
     have = Coverage(resonance=None if share is None else share * rate)
     for record in propose(converter, 10.0, 1e-6, have):
         for wave in (record.plan.x, record.plan.y):
-            drive = whole(wave)
+            drive = wave
             assert drive.min() >= converter.lower * (1.0 + 1e-9) - 1e-12 * limit
             assert drive.max() <= limit * (1.0 + 1e-9)
             assert abs(drive[0]) < 1e-9 * limit
@@ -55,7 +54,7 @@ def test_each_proposed_drive_is_recognised_and_not_proposed_again(lower: float) 
     kinds = {"hysteresis": None, "error": None, "creep": "creep"}
     assert [record.identifies for record in proposed] == list(kinds)
     for record in proposed:
-        drive = whole(record.plan.x)
+        drive = record.plan.x
         assert recognised(drive) == kinds[record.identifies]
         moved = resonant(drive, record.plan.sample_period, 200.0)
         seen = coverage(drive, moved, record.plan.sample_period)
@@ -67,7 +66,7 @@ def test_a_survey_finds_the_resonance_and_the_other_records_follow() -> None:
     converter = ConverterLimits(-1.0, 1.0, 5e3)
     record = propose(converter, 10.0, 1e-6, Coverage())[0]
     assert record.identifies == "resonance"
-    drive = whole(record.plan.x)
+    drive = record.plan.x
     moved = resonant(drive, record.plan.sample_period, 170.0)
     found = coverage(drive, moved, record.plan.sample_period)
     assert found.resonance == pytest.approx(170.0, rel=0.04)
@@ -86,7 +85,7 @@ def test_loops_reach_only_as_far_as_scans_need() -> None:
         ConverterLimits(-10.0, 10.0, 50e3), 10.0, 10e-6, Coverage(gain=1e-6, resonance=300.0)
     )
     (loops,) = (record for record in proposed if record.identifies == "hysteresis")
-    assert np.ptp(whole(loops.plan.x)) == pytest.approx(14.0, rel=0.03)
+    assert np.ptp(loops.plan.x) == pytest.approx(14.0, rel=0.03)
 
 
 def test_limits_without_zero_are_refused() -> None:

@@ -10,8 +10,7 @@ from afm_scan_ros.core.fit.model_of_fit import model_of
 from afm_scan_ros.core.fit.plays import Plays
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.told import Knowledge
-from afm_scan_ros.core.identification.spread_of_fit import HeldOut, spread_of
-from afm_scan_ros.core.identification.validation import validate_from
+from afm_scan_ros.core.identification.validation import Validation, spread_of, validate_from
 from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.prediction import apart
 from helpers.fit_cases import GAIN, LIMIT, PERIOD, levels, of_plays_alone
@@ -34,13 +33,15 @@ def model(known: Knowledge) -> AxisModel:
     return model_of(known.fit)
 
 
-def left_out(model: AxisModel, drive: np.ndarray, error: float, first: int = 0) -> HeldOut:
+def left_out(
+    model: AxisModel, drive: np.ndarray, error: float, first: int = 0
+) -> tuple[afm.Record, Validation]:
     """Return a record that the model misses by a share of the motion, from a sample on."""
     before = np.concatenate([[0.0], drive[:-1]])
     noise = np.random.default_rng(6).normal(0.0, NOISE, len(drive))
     moved = (1.0 + error) * GAIN * before + noise
     record = afm.Record(drive, moved, PERIOD, start="depolarised", name="left out")
-    return HeldOut(record, first, validate_from(model, record, first))
+    return record, validate_from(model, record, first)
 
 
 @pytest.mark.parametrize("first", [0, 6000])

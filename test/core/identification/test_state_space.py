@@ -12,7 +12,6 @@ from afm_scan_ros.core.identification.state_space.model import (
     ModalForm,
     StateSpaceModel,
     modal_form,
-    modes,
 )
 
 PERIOD = 1e-3
@@ -62,21 +61,6 @@ def test_steps_settle_to_the_steady_state(form: ModalForm, seed: int) -> None:
     system = model.a, model.b, model.c, model.d, PERIOD
     _, outputs, _ = dlsim(system, np.tile(inputs, (2, 1)))
     assert_allclose(outputs[SAMPLES:], model.steady_state(inputs), rtol=1e-9, atol=1e-9)
-
-
-def test_mode_has_the_frequency_and_damping_of_its_pole() -> None:
-    rate = 2.0 * np.pi * 120.0 * (-0.02 + 1j * np.sqrt(1.0 - 0.02**2))
-    form = ModalForm(
-        np.array([np.exp(rate * PERIOD), 0.5 + 0j]),
-        np.array([[3.0, 4.0j], [1.0, 0.0]]),
-        np.array([[2.0], [1.0]], dtype=complex),
-        np.zeros((2, 1)),
-    )
-    (mode,) = modes(form.realised(PERIOD))
-    assert mode.frequency == pytest.approx(120.0, rel=1e-9)
-    assert mode.damping == pytest.approx(0.02, rel=1e-9)
-    assert_allclose(np.abs(mode.left), [0.6, 0.8], rtol=1e-9)
-    assert mode.likeness(mode) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

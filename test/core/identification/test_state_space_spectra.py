@@ -10,6 +10,7 @@ from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.fit import squared_error
 from afm_scan_ros.core.identification.state_space.spectra import (
     PeriodicRecords,
+    Periods,
     joined,
     periodic_records,
     reliability,
@@ -31,7 +32,7 @@ def records(noise: Array, cubic: float = 0.0, seed: int = 0) -> PeriodicRecords:
     through = [MODEL.steady_state(drive[:, :, k] + cubic * drive[:, :, k] ** 3) for k in range(4)]
     output = np.stack([np.stack(through, axis=2)] * 2, axis=3)
     output = output + noise[:, np.newaxis] * rng.standard_normal(output.shape)
-    return periodic_records(np.stack([drive] * 2, axis=3), output, PERIOD, USED)
+    return periodic_records(Periods(np.stack([drive] * 2, axis=3), output, PERIOD, USED))
 
 
 def test_noise_of_the_mean_is_half_that_of_a_period() -> None:

@@ -18,7 +18,7 @@ from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.features.learning import learn_command as command
 from afm_scan_ros.files import share_directory, yaml
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.files.records import to_mapping
 from helpers.given_commands import commands_of

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.drivers.link import Link, Message
-from afm_scan_ros.features.view import kinds
-from afm_scan_ros.features.view.handover import Handover
-from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.handover import BLOCK, ENDED, LEFT_OUT, SAY, Handover
+from afm_scan_ros.features.view.viewer import ViewSettings
 
 SAMPLES = 20_000
 """In a block: more than a socket takes while nobody reads."""
@@ -21,7 +20,7 @@ SETTINGS = ViewSettings(queue=ROOM * 16.0 * SAMPLES, queued_news=5)
 
 
 def block(number: int) -> Message:
-    return Message(kinds.BLOCK, {"number": number}, np.full((2, SAMPLES), float(number)))
+    return Message(BLOCK, {"number": number}, np.full((2, SAMPLES), float(number)))
 
 
 def read_slowly(end: socket.socket, pause: float, found: list[Message]) -> None:
@@ -48,12 +47,12 @@ def test_what_comes_and_what_is_told_as_left_out_is_all(count: int, pause: float
             handover.block(block(number))
         handover.finish()
         reader.join()
-    numbers = [each.fields["number"] for each in messages if each.kind == kinds.BLOCK]
-    lost = sum(each.fields["count"] for each in messages if each.kind == kinds.LEFT_OUT)
+    numbers = [each.fields["number"] for each in messages if each.kind == BLOCK]
+    lost = sum(each.fields["count"] for each in messages if each.kind == LEFT_OUT)
     assert numbers == sorted(numbers)
     assert len(numbers) + lost == count
     for each in messages:
-        if each.kind == kinds.BLOCK:
+        if each.kind == BLOCK:
             assert (each.samples == each.fields["number"]).all()
 
 
@@ -72,8 +71,8 @@ def test_the_oldest_go_and_are_counted_while_nobody_reads() -> None:
         while not messages or messages[-1].fields.get("number") != count - 1:
             messages.append(link.receive())
         handover.close()
-    numbers = [each.fields["number"] for each in messages if each.kind == kinds.BLOCK]
-    lost = sum(each.fields["count"] for each in messages if each.kind == kinds.LEFT_OUT)
+    numbers = [each.fields["number"] for each in messages if each.kind == BLOCK]
+    lost = sum(each.fields["count"] for each in messages if each.kind == LEFT_OUT)
     assert numbers[-ROOM:] == list(range(count - ROOM, count))
     assert lost == count - len(numbers) > count - 2 * ROOM
 
@@ -85,14 +84,14 @@ def test_news_are_bounded_too_and_come_beside_blocks_that_wait() -> None:
         for number in range(ROOM):
             handover.block(block(number))
         for number in range(20):
-            handover.news(Message(kinds.SAY, {"text": str(number)}))
+            handover.news(Message(SAY, {"text": str(number)}))
         link = Link(theirs)
         link.patience = 10.0
         messages = [link.receive() for _ in range(ROOM)]
         handover.close()
-    texts = [each.fields["text"] for each in messages if each.kind == kinds.SAY]
+    texts = [each.fields["text"] for each in messages if each.kind == SAY]
     assert texts == [str(number) for number in range(15, 20)]
-    assert [each.fields["count"] for each in messages if each.kind == kinds.LEFT_OUT] == [15]
+    assert [each.fields["count"] for each in messages if each.kind == LEFT_OUT] == [15]
 
 
 def test_a_process_that_is_gone_or_does_not_read_holds_up_nothing() -> None:
@@ -114,10 +113,10 @@ def test_the_last_word_comes_after_blocks_that_wait() -> None:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         handover = Handover(ours, SETTINGS)
-        handover.last = Message(kinds.ENDED)
+        handover.last = Message(ENDED)
         for number in range(ROOM // 2):
             handover.block(block(number))
         handover.finish()
         messages: list[Message] = []
         read_slowly(theirs, 0.0, messages)
-    assert [each.kind for each in messages] == [kinds.BLOCK] * (ROOM // 2) + [kinds.ENDED]
+    assert [each.kind for each in messages] == [BLOCK] * (ROOM // 2) + [ENDED]

@@ -10,7 +10,7 @@ import pytest
 
 from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.streams import monitor_step
-from afm_scan_ros.features.view.settings import ViewSettings
+from afm_scan_ros.features.view.viewer import ViewSettings
 from helpers.viewed import command, curve, feeder_of, let_go_on, news, recorded, states
 
 pytest.importorskip("rerun", reason="the viewer is not installed: pip install 'afm_scan_ros[view]'")

@@ -5,18 +5,15 @@ a record shows which of them it is of.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.identification.drives.waveforms import (
-    Multisine,
-    Scaled,
-    Waveform,
-    Waypoints,
+    multisine,
     random_phase_waves,
+    waypoints,
 )
 from afm_scan_ros.core.types import Array, Trace
 
@@ -25,26 +22,20 @@ DEFAULT_RESONANCE = 454.0
 DEFAULT_LIMIT = 3.6
 """V that the default validation drive reaches."""
 
-Driven_co = TypeVar("Driven_co", bound=Waveform, covariant=True)
-
 
 @frozen(eq=False)
-class Plan(Generic[Driven_co]):
-    """The drives of both axes, at one sample period; the one that is done first rests."""
+class Plan:
+    """Drives of both axes, V at every sample; the one that is done first rests."""
 
     name: str
-    x: Driven_co
-    y: Driven_co
-
-    @property
-    def sample_period(self) -> float:
-        """Seconds between samples."""
-        return self.x.sample_period
+    sample_period: float
+    x: Array
+    y: Array
 
     @property
     def total_samples(self) -> int:
         """Samples in the record."""
-        return max(self.x.total_samples, self.y.total_samples)
+        return max(len(self.x), len(self.y))
 
     @property
     def duration(self) -> float:
@@ -52,19 +43,16 @@ class Plan(Generic[Driven_co]):
         return self.total_samples * self.sample_period
 
 
-def excitation_block(plan: Plan[Waveform], first: int, count: int) -> Trace:
+def excitation_block(plan: Plan, first: int, count: int) -> Trace:
     """Drive voltage of both axes for up to ``count`` samples from ``first``; short at the end."""
-    last = min(first + count, plan.total_samples)
-    samples = np.arange(first, last, dtype=np.float64)
-    x, y = (
-        axis.voltage(np.minimum(samples, axis.total_samples - 1.0)) for axis in (plan.x, plan.y)
-    )
+    samples = np.arange(first, min(first + count, plan.total_samples))
+    x, y = (axis[np.minimum(samples, len(axis) - 1)] for axis in (plan.x, plan.y))
     return Trace(first, plan.sample_period, x, y)
 
 
-def scaled(plan: Plan[Waveform], size: float, time: float = 1.0) -> Plan[Waveform]:
+def scaled(plan: Plan, size: float, time: float = 1.0) -> Plan:
     """Return a plan whose voltages are multiplied by ``size``, and its times by ``time``."""
-    return Plan(plan.name, Scaled(plan.x, size, time), Scaled(plan.y, size, time))
+    return Plan(plan.name, time * plan.sample_period, size * plan.x, size * plan.y)
 
 
 def creep_plan(
@@ -72,7 +60,7 @@ def creep_plan(
     height: float = 0.5,
     rate: float = 100.0,
     down: int = -1,
-) -> Plan[Waypoints]:
+) -> Plan:
     """Steps of ``height`` V, each held for the times ``holds`` (s), and a slow return to rest.
 
     x steps up and up again, y down and back, at the same moments: what either does to the other
@@ -86,50 +74,44 @@ def creep_plan(
     samples = np.rint(np.cumsum([0.0, *lengths]))
     stair = np.arange(len(holds) + 1)
     x, y = (
-        Waypoints(1.0 / rate, np.append(np.repeat(height * levels, 2), 0.0), samples, 0.05 * rate)
+        waypoints(np.append(np.repeat(height * levels, 2), 0.0), samples, 0.05 * rate)
         for levels in (stair, down * (stair % 2))
     )
-    return Plan("creep", x, y)
+    return Plan("creep", 1.0 / rate, x, y)
 
 
-@frozen(eq=False)
-class FrequencyLines:
-    """Sines of one period that a frequency record sums.
+def frequency_plan() -> Plan:
+    """A random-phase multisine of low amplitude, seven periods; each axis has phases of its own.
 
-    ``period`` is in samples at ``rate`` Hz, ``lines`` in cycles a period, (m,), ``amplitudes``
-    their relative sizes, (m,), ``peak`` the largest wave's peak, V.
-    """
-
-    rate: float
-    period: int
-    lines: NDArray[np.int64]
-    amplitudes: Array
-    peak: float
-
-
-def default_lines() -> FrequencyLines:
-    """Lines every 2 Hz up to 700 Hz, which resolves the resonance, and every 10 Hz to 2 kHz.
-
-    From 200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
+    Lines every 2 Hz up to 700 Hz resolve the resonance, and others lie every 10 Hz to 2 kHz. From
+    200 Hz the amplitude falls as 1/f: the drive then turns round seldom, which keeps the
     hysteresis' share in the response small, and spares the amplifier.
     """
     dense, sparse = np.arange(2, 351), np.arange(355, 1001, 5)
     lines = np.concatenate([dense, sparse])
     amplitudes = np.minimum(1.0, 100.0 / lines) * np.where(lines > dense[-1], 2.0, 1.0)
-    return FrequencyLines(20_000.0, 10_000, lines, amplitudes, peak=0.5)
+    return waves_plan("frequency", 20_000.0, 10_000, lines, amplitudes, peak=0.5)
 
 
-def frequency_plan(lines: FrequencyLines | None = None) -> Plan[Multisine]:
-    """A random-phase multisine of low amplitude, seven periods; each axis has phases of its own."""
-    sines = default_lines() if lines is None else lines
+def waves_plan(
+    name: str,
+    rate: float,
+    period: int,
+    lines: NDArray[np.int64],
+    amplitudes: Array,
+    peak: float,
+    repeats: int = 7,
+) -> Plan:
+    """Sines summed over a ``period`` (samples at ``rate`` Hz) and repeated; phases differ by axis.
+
+    ``lines`` are in cycles a period, (m,), ``amplitudes`` their relative sizes, (m,), ``peak`` is
+    the largest wave's peak, V.
+    """
     rng = np.random.default_rng(1)
-
-    def multisine() -> Multisine:
-        phases = rng.random((1, len(sines.lines)))
-        waves = random_phase_waves(sines.lines, sines.amplitudes, sines.period, phases)
-        return Multisine(1.0 / sines.rate, sines.peak * waves, repeats=7)
-
-    return Plan("frequency", multisine(), multisine())
+    x, y = (
+        random_phase_waves(lines, amplitudes, period, rng.random((1, len(lines)))) for _ in range(2)
+    )
+    return Plan(name, 1.0 / rate, multisine(peak * x, repeats), multisine(peak * y, repeats))
 
 
 MOVES = 240
@@ -146,7 +128,7 @@ def hysteresis_plan(
     rate: float = 20e3,
     resonance: float = DEFAULT_RESONANCE,
     moves: int = MOVES,
-) -> Plan[Waypoints]:
+) -> Plan:
     """Moves between random levels within ``limit`` V, each faster than the last.
 
     The first two go to both ends, so that the memory is known from there on. The slowest move
@@ -164,23 +146,23 @@ def validation_plan(
     rate: float = 20e3,
     resonance: float = DEFAULT_RESONANCE,
     moves: int = MOVES,
-) -> Plan[Waypoints]:
+) -> Plan:
     """Moves as those of ``hysteresis_plan`` between other levels: they are held out of the fit."""
     return _levels_plan("validation", limit, seeds, rate, resonance, moves)
 
 
 def _levels_plan(
     name: str, limit: float, seeds: tuple[int, int], rate: float, resonance: float, moves: int
-) -> Plan[Waypoints]:
+) -> Plan:
     tempo, firsts = resonance / DEFAULT_RESONANCE, (limit, -limit)
     x, y = (
         _random_moves(first, seed, rate, tempo, moves)
         for first, seed in zip(firsts, seeds, strict=True)
     )
-    return Plan(name, x, y)
+    return Plan(name, 1.0 / rate, x, y)
 
 
-def _random_moves(first: float, seed: int, rate: float, tempo: float, moves: int) -> Waypoints:
+def _random_moves(first: float, seed: int, rate: float, tempo: float, moves: int) -> Array:
     """Moves to the level ``first`` (V), to the opposite end, and between random ones."""
     blend, speeds = 1e-3 / tempo, tempo / DEFAULT_LIMIT * np.geomspace(*SPEEDS, moves + 1)
     levels = np.random.default_rng(seed).uniform(-1.0, 1.0, moves - 2)
@@ -190,10 +172,10 @@ def _random_moves(first: float, seed: int, rate: float, tempo: float, moves: int
     levels[1:-1] *= np.minimum(1.0, np.sqrt(periods[:moves] / RINGING))
     path = first * np.concatenate([[0.0], levels, [0.0]])
     samples = np.concatenate([[0.0], np.cumsum(np.rint(np.r_[0.5, seconds, 0.5] * rate))])
-    return Waypoints(1.0 / rate, path, samples, blend * rate)
+    return waypoints(path, samples, blend * rate)
 
 
-PLANS: dict[str, Callable[[], Plan[Waveform]]] = {
+PLANS: dict[str, Callable[[], Plan]] = {
     "creep": creep_plan,
     "frequency": frequency_plan,
     "hysteresis": hysteresis_plan,

@@ -23,7 +23,6 @@ from afm_scan_ros.core.identification.drives.proposal import (
     ProposedRecord,
     response_peak,
 )
-from afm_scan_ros.core.identification.drives.waveforms import Waveform
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 FIRST = 1.0 / 16.0
@@ -103,7 +102,7 @@ class Watched:
     responses: Mapping[str, MeasuredResponse]
 
 
-Drive = Callable[[Plan[Waveform], GrowthStep], tuple[Trace, Trace]]
+Drive = Callable[[Plan, GrowthStep], tuple[Trace, Trace]]
 """Drives a plan, and returns drive (V) and measured displacement (m)."""
 
 
@@ -208,7 +207,7 @@ def response(
     that is sampled too slowly shows no excitation.
     """
     if resonance is None:
-        resonance = response_peak(drive, displacement, sample_period)[1]
+        resonance = response_peak(drive, displacement, sample_period)
     slow_drive, fast_drive = _split(drive, sample_period, 0.5 * resonance)
     slow, fast = _split(displacement, sample_period, 0.5 * resonance)
     gain = float(slow_drive @ slow / (slow_drive @ slow_drive)) if np.any(slow_drive) else 0.0

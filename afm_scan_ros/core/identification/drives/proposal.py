@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import gt
-from numpy.typing import NDArray
 from scipy import signal
 
 from afm_scan_ros.core.effects.scale import half_range_of
@@ -14,21 +13,14 @@ from afm_scan_ros.core.effects.vibration import first_resonance
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.excitation import (
     MOVES,
-    FrequencyLines,
     Plan,
     creep_plan,
-    frequency_plan,
     hysteresis_plan,
     scaled,
     validation_plan,
+    waves_plan,
 )
-from afm_scan_ros.core.identification.drives.waveforms import (
-    Multisine,
-    Raised,
-    Waveform,
-    Waypoints,
-    whole,
-)
+from afm_scan_ros.core.identification.drives.waveforms import raised
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.model import ScannerModel
@@ -71,7 +63,7 @@ def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverag
         hold = sample_period * (rest.stop - rest.start)
         return Coverage(hold=hold, gain=gain, creep=_creep(displacement, rest))
     if kind == "frequency":
-        return Coverage(resonance=response_peak(drive, displacement, sample_period)[1])
+        return Coverage(resonance=response_peak(drive, displacement, sample_period))
     turns = np.unique(np.rint(drive[turning_points(drive)] / (APART * swing))) if swing else ()
     if len(turns) >= TURNS:
         return Coverage(loops=swing, gain=gain)
@@ -130,12 +122,11 @@ def _creep(displacement: Array, rest: slice) -> float:
     return max(1.0, late / early) if early else 1.0
 
 
-def response_peak(drive: Array, displacement: Array, sample_period: float) -> tuple[float, float]:
-    """Highest frequency that waves drive, and that of the largest response, both Hz.
+def response_peak(drive: Array, displacement: Array, sample_period: float) -> float:
+    """Frequency (Hz) of the largest response of a displacement (m) to a drive (V), both (n,).
 
-    ``drive`` (V) and ``displacement`` (m) are both (n,), ``sample_period`` is in s. By Welch's
-    averaged spectra, whose lines are a 16th of the record; noise alone is left out where the drive
-    has less than its mean power divided by DRIVEN.
+    By Welch's averaged spectra, whose lines are a 16th of the record; noise alone is left out where
+    the drive has less than its mean power divided by DRIVEN.
     """
     length = len(drive) // 16
     options = {"fs": 1.0 / sample_period, "nperseg": length}
@@ -144,7 +135,7 @@ def response_peak(drive: Array, displacement: Array, sample_period: float) -> tu
     driven = power > power.mean() / DRIVEN
     response = np.where(driven, np.abs(cross) / np.where(driven, power, 1.0), 0.0)
     response[:2] = 0.0
-    return float(frequencies[driven].max()), float(frequencies[response.argmax()])
+    return float(frequencies[response.argmax()])
 
 
 SURVEY_LINES = 25.0
@@ -204,8 +195,8 @@ class ProposedRecord:
     ``trial`` is as large, as fast and as sudden, and shorter where it can be.
     """
 
-    plan: Plan[Waveform]
-    trial: Plan[Waveform]
+    plan: Plan
+    trial: Plan
     identifies: str
     covers: float
 
@@ -217,8 +208,11 @@ class ProposedRecord:
     @property
     def steepest(self) -> float:
         """Steepest slope of the drive and of its trial, V/s."""
-        waves = (wave for plan in (self.plan, self.trial) for wave in (plan.x, plan.y))
-        return max(float(np.abs(np.diff(whole(w))).max() / w.sample_period) for w in waves)
+        return max(
+            float(np.abs(np.diff(wave)).max()) / plan.sample_period
+            for plan in (self.plan, self.trial)
+            for wave in (plan.x, plan.y)
+        )
 
     def scaled(self, share: float) -> "ProposedRecord":
         """Return the record with all voltages multiplied."""
@@ -260,9 +254,8 @@ def _lacking(
 ) -> Iterator[ProposedRecord]:
     if have.resonance is None:
         highest = converter.rate / PER_PERIOD
-        waves = _waves(converter, highest, highest / DECADES, SURVEY_LINES)
-        survey = evolve(frequency_plan(lines=waves), name="survey")
-        yield _record(converter, survey, _brief(survey), "resonance", highest)
+        survey, trial = (_survey(converter, highest, count) for count in (7, TRIAL_PERIODS))
+        yield _record(converter, survey, trial, "resonance", highest)
     else:
         yield from _levels(converter, have.resonance, have)
     if hold is not None and have.hold < hold:
@@ -288,16 +281,10 @@ def _levels(
         yield _record(converter, moves, moves, "error", 1.8 * swing)
 
 
-def _brief(plan: Plan[Multisine]) -> Plan[Multisine]:
-    """The waves for few periods."""
-    x, y = (evolve(axis, repeats=TRIAL_PERIODS) for axis in (plan.x, plan.y))
-    return Plan(plan.name, x, y)
-
-
 def _record(
     converter: ConverterLimits,
-    plan: Plan[Waypoints] | Plan[Multisine],
-    trial: Plan[Waypoints] | Plan[Multisine],
+    plan: Plan,
+    trial: Plan,
     identifies: str,
     covers: float,
 ) -> ProposedRecord:
@@ -305,34 +292,28 @@ def _record(
     return ProposedRecord(_raised(plan, converter), _raised(trial, converter), identifies, covers)
 
 
-def _waves(
-    converter: ConverterLimits, highest: float, lowest: float, per_resonance: float
-) -> FrequencyLines:
-    """Lines up to ``highest``, dense enough for a resonance from ``lowest`` on, both Hz.
+def _survey(converter: ConverterLimits, highest: float, repeats: int) -> Plan:
+    """Waves up to ``highest`` (Hz), dense enough for a resonance from the lowest looked for on.
 
-    They fall as 1/f above 0.44 times the lowest resonance, so that the drive seldom turns round;
-    they are raised as they lie farther apart.
+    Each line is driven up to 1.5 times that one, and then as many as grow in proportion to the
+    frequency. They fall as 1/f above 0.44 times it, so that the drive seldom turns round; they are
+    raised as they lie farther apart.
     """
-    period = round(converter.rate * per_resonance / lowest)
-    lines = _widening(period, converter.rate, highest, lowest, per_resonance)
-    corner = 0.44 * lowest * period / converter.rate
-    apart = np.sqrt(np.gradient(lines.astype(np.float64)))
-    amplitudes = np.minimum(1.0, corner / lines) * apart
-    return FrequencyLines(converter.rate, period, lines, amplitudes, converter.swing / 8.0)
-
-
-def _widening(
-    period: int, rate: float, highest: float, lowest: float, per_resonance: float
-) -> NDArray[np.int64]:
-    """Lines (cycles a period), (m,): each up to 1.5 times a frequency, then in proportion to it."""
+    lowest, rate = highest / DECADES, converter.rate
+    period = round(rate * SURVEY_LINES / lowest)
     dense = round(1.5 * lowest * period / rate)
     wide = math.log(highest * period / rate / dense)
-    further = np.arange(1, int(per_resonance * wide) + 1) / per_resonance
+    further = np.arange(1, int(SURVEY_LINES * wide) + 1) / SURVEY_LINES
     sparse = np.rint(dense * np.exp(further)).astype(np.int64)
-    return np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
+    lines = np.unique(np.concatenate([np.arange(2, dense + 1), sparse]))
+    corner = 0.44 * lowest * period / rate
+    apart = np.sqrt(np.gradient(lines.astype(np.float64)))
+    amplitudes = np.minimum(1.0, corner / lines) * apart
+    peak = converter.swing / 8.0
+    return waves_plan("survey", rate, period, lines, amplitudes, peak, repeats)
 
 
-def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan[Waypoints]:
+def _steps(converter: ConverterLimits, hold: float, rate: float) -> Plan:
     """Two steps of an eighth of the range, or what the upper limit leaves; down where it can be."""
     height = min(converter.swing / 8.0, converter.upper / 2.0)
     down = -1 if converter.lower <= -height else 1
@@ -344,9 +325,9 @@ def _divided(rate: float, wanted: float) -> float:
     return rate / max(1, int(rate / wanted))
 
 
-def _raised(plan: Plan[Waypoints] | Plan[Multisine], converter: ConverterLimits) -> Plan[Waveform]:
+def _raised(plan: Plan, converter: ConverterLimits) -> Plan:
     """Drive about the converter's middle."""
     if converter.middle == 0.0:
-        return Plan(plan.name, plan.x, plan.y)
-    x, y = (Raised(wave, converter.middle, RAISED_SECONDS) for wave in (plan.x, plan.y))
-    return Plan(plan.name, x, y)
+        return plan
+    rise = plan.sample_period, converter.middle, RAISED_SECONDS
+    return evolve(plan, x=raised(plan.x, *rise), y=raised(plan.y, *rise))

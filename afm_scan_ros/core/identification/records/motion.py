@@ -5,7 +5,6 @@ from itertools import pairwise, permutations, product
 from typing import TypeAlias
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import detrend
@@ -25,32 +24,25 @@ ALIKE = 0.999
 """Correlation of both drives beyond which the responses to them cannot be separated."""
 
 
-@frozen
-class DriveLag:
-    """Samples by which a displacement is best delayed against a drive, and their correlation."""
-
-    samples: int
-    correlation: float
-
-
 def motion_problems(drive: Trace, displacement: Trace, axes: Sequence[str]) -> Iterator[str]:
     """Yield what a displacement (m) shows that a scanner so driven (V) would not."""
     changes = {axis: _changes(drive.axis(axis), displacement.axis(axis)) for axis in axes}
     given, moved = ({axis: changes[axis][k] for axis in axes} for k in (0, 1))
     lags = _lags(given, moved)
     for axis, other in permutations(axes, 2):
-        foreign, own = (np.roll(given[a], lags[a, axis].samples) for a in (other, axis))
+        foreign, own = (np.roll(given[a], lags[a, axis][0]) for a in (other, axis))
         if _belongs(foreign, own, moved[axis]):
             yield (
                 f"displacement {axis} follows drive {other}: it is a record of axis {other};"
                 " connect the axes as they are named and record again"
             )
     for axis in axes:
-        if lags[axis, axis].correlation < CHANCE / np.sqrt(len(drive.x)):
+        late, correlation = lags[axis, axis]
+        if correlation < CHANCE / np.sqrt(len(drive.x)):
             yield from _follows(axis, drive.axis(axis), displacement.axis(axis))
         yield from _sign(axis, drive.axis(axis), displacement.axis(axis))
-        turns = _lags({axis: np.sign(given[axis])}, {axis: moved[axis]})[axis, axis]
-        least = min(lags[axis, axis].samples, turns.samples, key=abs)
+        turns, _ = _lags({axis: np.sign(given[axis])}, {axis: moved[axis]})[axis, axis]
+        least = min(late, turns, key=abs)
         if _surely(least, drive.sample_period, given[axis], moved[axis]):
             yield from _in_step(axis, least, drive.sample_period)
 
@@ -147,8 +139,11 @@ def offset_at_rest(drive: Array, displacement: Array) -> float:
 
 def _lags(
     given: Mapping[str, Array], moved: Mapping[str, Array]
-) -> dict[tuple[str, str], DriveLag]:
-    """Lag of each axis' moves against each axis' drive, by the names of drive and displacement."""
+) -> dict[tuple[str, str], tuple[int, float]]:
+    """Samples by which each axis' moves best lag each axis' drive, and their correlation.
+
+    The keys are the names of drive and displacement.
+    """
     length = len(next(iter(given.values())))
     size = next_fast_len(2 * length - 1, real=True)
     drives, moves = (
@@ -160,7 +155,7 @@ def _lags(
         correlation = irfft(moves[displacement] * drives[drive].conj(), size)
         best = int(np.argmax(correlation))
         samples = best - size * (best > size // 2)
-        found[drive, displacement] = DriveLag(samples, float(correlation[best]))
+        found[drive, displacement] = samples, float(correlation[best])
     return found
 
 

@@ -19,13 +19,12 @@ from afm_scan_ros.core.effects.effect_type import FeedbackElement
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.state_space.fit import gauss_newton
 from afm_scan_ros.core.identification.state_space.model import (
-    Complex,
     ModalForm,
     StateSpaceModel,
     modal_form,
 )
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 ROUNDS = 200
 DEPTH = 20

@@ -23,13 +23,12 @@ from scipy.linalg import qr
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.model import (
-    Complex,
     ModalForm,
     StateSpaceModel,
     modal_form,
 )
 from afm_scan_ros.core.identification.state_space.spectra import Spectra
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 
 def normal_equations(form: ModalForm, spectra: Spectra) -> tuple[Array, Array]:

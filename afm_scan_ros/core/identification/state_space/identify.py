@@ -28,7 +28,7 @@ from afm_scan_ros.core.identification.state_space.feedback import (
     fit_feedback,
 )
 from afm_scan_ros.core.identification.state_space.fit import COARSE_LINES, fit_state_space, refined
-from afm_scan_ros.core.identification.state_space.model import StateSpaceModel, modes
+from afm_scan_ros.core.identification.state_space.model import StateSpaceModel, modal_form
 from afm_scan_ros.core.identification.state_space.spectra import (
     PeriodicRecords,
     Periods,
@@ -201,7 +201,7 @@ class Teaching:
     @classmethod
     def of(cls, periods: Periods, levels: list[list[int]]) -> "Teaching":
         """Return those of some levels, each level counting by its error relative to its output."""
-        found = [_of_level(periods, level) for level in levels]
+        found = [periodic_records(periods.of(level)) for level in levels]
         weights = [_weight(each) / np.linalg.norm(each.spectra.outputs) for each in found]
         spectra = [each.spectra.weighted(w) for each, w in zip(found, weights, strict=True)]
         return cls(periods, levels, spectra, weights)
@@ -213,10 +213,7 @@ class Teaching:
 
     def steady(self) -> SteadyRecords:
         """Return the periods, averaged, with their weights."""
-        used = [k for level in self.levels for k in level]
-        drive, output = (
-            signal[:, :, used].mean(axis=3) for signal in (self.periods.drive, self.periods.output)
-        )
+        drive, output = self.periods.of([k for level in self.levels for k in level]).mean
         weight = np.concatenate(self.weights, axis=1)
         return SteadyRecords(drive, output, self.periods.used, weight, self.periods.sample_period)
 
@@ -225,15 +222,6 @@ def _weight(records: PeriodicRecords) -> Array:
     """Reliability of records, (lines, records); all alike where they are too few to tell."""
     lines, inputs, count = records.spectra.inputs.shape
     return reliability(records) if count > inputs else np.ones((lines, count))
-
-
-def _of_level(periods: Periods, level: list[int]) -> PeriodicRecords:
-    return periodic_records(
-        periods.drive[:, :, level],
-        periods.output[:, :, level],
-        periods.sample_period,
-        periods.used,
-    )
 
 
 def levels_of(records: Sequence[Record]) -> list[list[int]]:
@@ -272,14 +260,17 @@ def actuators_of(linear: StateSpaceModel, taught: Teaching) -> Actuators:
     scale, drive_scale = (
         np.sqrt(np.mean(signal**2, axis=(0, 2, 3))) for signal in (moved, periods.drive)
     )
-    decays = [1.0 / (2.0 * np.pi * mode.frequency * mode.damping) for mode in modes(linear)]
-    decay = float(np.median(decays)) if decays else linear.sample_period
-    return Actuators(drive_scale, elongation / scale[:, np.newaxis], decay, linear.sample_period)
+    poles, period = modal_form(linear.a, linear.b, linear.c, linear.d).poles, linear.sample_period
+    rates = np.log(poles[poles.imag > 0.0]) / period
+    frequencies, dampings = np.abs(rates) / (2.0 * np.pi), -rates.real / np.abs(rates)
+    decays = 1.0 / (2.0 * np.pi * frequencies * dampings)
+    decay = float(np.median(decays)) if len(decays) else period
+    return Actuators(drive_scale, elongation / scale[:, np.newaxis], decay, period)
 
 
 def _error(model: FeedbackModel, periods: Periods, level: list[int]) -> LevelError:
     """Rms over outputs, records and samples of what the simulation leaves, of the periods' mean."""
-    drive, output = (signal[:, :, level].mean(axis=3) for signal in (periods.drive, periods.output))
+    drive, output = periods.of(level).mean
     output = output - output.mean(axis=0)
     left = model.steady_state(drive) - output
     rms, error, moved = (float(np.sqrt(np.mean(each**2))) for each in (drive, left, output))
@@ -308,8 +299,7 @@ def coupling_is_seen(records: Sequence[Record]) -> bool:
     inputs, outputs = periods.drive.shape[1], periods.output.shape[1]
     if inputs != outputs or min(map(len, levels)) <= inputs:
         return False
-    drive, output = (signal[:, :, levels[-1]] for signal in (periods.drive, periods.output))
-    spectra = periodic_records(drive, output, periods.sample_period, periods.used).spectra
+    spectra = periodic_records(periods.of(levels[-1])).spectra
     return any(_follows_others(spectra, axis) for axis in range(outputs))
 
 

@@ -8,13 +8,10 @@ from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array
-
-Complex = NDArray[np.complex128]
+from afm_scan_ros.core.types import Array, Complex
 
 LINES_AT_ONCE = 4096
 """Of a response: each takes a matrix of its own."""
@@ -141,37 +138,3 @@ def modal_form(a: Array, b: Array, c: Array, d: Array) -> ModalForm:
     beyond = np.abs(poles) >= 1.0
     poles[beyond] = 1.0 / poles[beyond].conj()
     return ModalForm(poles, left, right, d)
-
-
-@frozen(eq=False)
-class Mode:
-    """A vibration: ``frequency`` in Hz, at which it would swing undamped, and damping ratio.
-
-    ``left`` (p,) and ``right`` (m,): how it shows in the outputs and is driven, of length 1.
-    """
-
-    frequency: float
-    damping: float
-    left: Complex
-    right: Complex
-
-    def likeness(self, other: "Mode") -> float:
-        """1 where both have the same shape in inputs and outputs, 0 where they share nothing."""
-        shapes = np.vdot(self.left, other.left) * np.vdot(self.right, other.right)
-        return float(np.abs(shapes))
-
-
-def modes(model: StateSpaceModel) -> tuple[Mode, ...]:
-    """Return the vibrations, from the slowest: one for each pair of complex poles."""
-    form = modal_form(model.a, model.b, model.c, model.d)
-    rates = np.log(form.poles) / model.sample_period
-    lefts, rights = (
-        shape / np.linalg.norm(shape, axis=1, keepdims=True) for shape in (form.left, form.right)
-    )
-    return tuple(
-        Mode(float(np.abs(rate) / (2.0 * np.pi)), float(-rate.real / np.abs(rate)), left, right)
-        for rate, left, right in sorted(
-            zip(rates, lefts, rights, strict=True), key=lambda term: float(np.abs(term[0]))
-        )
-        if 0.0 < rate.imag * model.sample_period < np.pi
-    )

@@ -14,9 +14,8 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.model import Complex
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 REPEATS = 0.01
 """Share of a drive's power by which it may differ between periods; unlike drives differ by all."""
@@ -48,6 +47,15 @@ class Periods:
     output: Array
     sample_period: float
     used: NDArray[np.bool_]
+
+    def of(self, level: Sequence[int]) -> "Periods":
+        """Return some of the records."""
+        return evolve(self, drive=self.drive[:, :, level], output=self.output[:, :, level])
+
+    @property
+    def mean(self) -> tuple[Array, Array]:
+        """Drive and output (samples, ·, records) averaged over the periods."""
+        return self.drive.mean(axis=3), self.output.mean(axis=3)
 
 
 def in_periods(records: Sequence[Record]) -> Periods:
@@ -214,19 +222,15 @@ class PeriodicRecords:
     noise: Array
 
 
-def periodic_records(
-    inputs: Array, outputs: Array, sample_period: float, used: NDArray[np.bool_]
-) -> PeriodicRecords:
-    """Spectra at the lines ``used``, of samples // 2 + 1 from zero.
-
-    ``inputs`` (samples, m, records, periods), ``outputs`` (samples, p, records, periods), of two
-    periods or more.
-    """
-    each = np.fft.rfft(outputs, axis=0)[used]
-    driven = np.asarray(np.fft.rfft(inputs.mean(axis=3), axis=0)[used])
-    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(inputs), sample_period)[used])
+def periodic_records(periods: Periods) -> PeriodicRecords:
+    """Spectra at the lines used, of two periods or more."""
+    each = np.fft.rfft(periods.output, axis=0)[periods.used]
+    drive = periods.drive.mean(axis=3)
+    driven = np.asarray(np.fft.rfft(drive, axis=0)[periods.used])
+    frequency = np.fft.rfftfreq(len(drive), periods.sample_period)[periods.used]
     noise = each.var(axis=3, ddof=1) / each.shape[3]
-    return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), sample_period), noise)
+    omega = np.asarray(2.0 * np.pi * frequency)
+    return PeriodicRecords(Spectra(omega, driven, each.mean(axis=3), periods.sample_period), noise)
 
 
 def reliability(records: PeriodicRecords) -> Array:

@@ -127,13 +127,9 @@ def lattice_of(heights: Array, pitch: tuple[float, float]) -> Lattice:
         )
     area, k, m, negative = min(pairs)
     shortest = _ordered(vectors[k].astype(float), vectors[m].astype(float))
-    return Lattice(shortest, float(np.sqrt(area)), bool(negative), _two_levels(heights))
-
-
-def _two_levels(heights: Array) -> bool:
-    """Whether heights lie at two levels, rather than as those of a sum of two sines."""
-    from_middle = heights - heights.mean()
-    return bool(from_middle.std() < LEVELS * np.abs(from_middle).mean())
+    apart = heights - heights.mean()
+    two_levels = bool(apart.std() < LEVELS * np.abs(apart).mean())
+    return Lattice(shortest, float(np.sqrt(area)), bool(negative), two_levels)
 
 
 def _high_peaks(likeness: Array, pitch: tuple[float, float]) -> tuple[NDArray[np.int64], Array]:

@@ -17,8 +17,8 @@ from attrs import evolve, frozen
 
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.fit.model_of_fit import direct_of, from_rest
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
+from afm_scan_ros.core.fit.surfaces import direct_of, from_rest
 from afm_scan_ros.core.fit.told import unknown
 from afm_scan_ros.core.model import (
     Added,
@@ -76,13 +76,14 @@ class Positions:
 
 def positions_of(registration: Registration, *, upward: bool = True) -> Positions:
     """Turn the motion in cells into x and y in m."""
-    cells = [registration.image(direction) for direction in range(2)]
+    form = registration.form
+    cells = [form.image(direction, registration.coefficients) for direction in range(2)]
     along = np.sum([each[:, -1] - each[:, 0] for each in cells], axis=0).mean(axis=0)
     cosine, sine = along / np.hypot(*along)
     turn = registration.pitch * np.array([[cosine, -sine], [sine, cosine]])
     middle = np.mean([each.mean(axis=(0, 1)) for each in cells], axis=0)
     found = [(each - middle) @ turn for each in cells]
-    uncertainty = registration.pitch * registration.uncertainty(0)
+    uncertainty = registration.pitch * form.deviation(0, registration.covariance)
     shown = np.einsum("lij,i,j->l", registration.shown, turn[:, 1], turn[:, 1])
     uncertainty[_before_edges(shown, upward=upward)] = np.inf
     return Positions(found[0], found[1], uncertainty)

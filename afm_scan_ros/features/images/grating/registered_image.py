@@ -31,6 +31,9 @@ MICRO, NANO = 1e6, 1e9
 ROUNDING = 1e-12
 """Share of the covariance's trace that keeps it positive definite."""
 
+Interval: TypeAlias = tuple[float, float, float]
+"""Value, and the ends of its 95 % interval."""
+
 
 @frozen
 class ImageQuantity:
@@ -102,57 +105,37 @@ def both_directions(seen: Sequence[RegisteredImage]) -> tuple[ImageQuantity, ...
 
     Of each direction the largest image counts. Drift is taken to be the same in both.
     """
-    up, down = (_largest(seen, upward=upward) for upward in (True, False))
+    up, down = (
+        max((e for e in seen if e.image.upward == way), key=lambda e: e.image.range_y, default=None)
+        for way in (True, False)
+    )
     if up is None or down is None:
         return ()
-    scale = _halves(up, down, "scale")
-    angle = _halves(up, down, "angle to a right one")
-    speed = _speed(up), _speed(down)
-    metres = float(np.mean(speed)) * NANO
-    across = np.radians(angle[1].value), np.radians(angle[1].lower), np.radians(angle[1].upper)
+    (scale, change), (angle, slant) = (
+        _halves(up, down, name) for name in ("scale", "angle to a right one")
+    )
+    images = up.image, down.image
+    speeds = [each.range_y / (each.lines * (each.line_time or np.inf)) for each in images]
+    metres = float(np.mean(speeds)) * NANO
+    across = (metres * float(np.tan(np.radians(each))) for each in slant)
     return (
-        ImageQuantity("scale without drift", "y", "1", *_values(scale[0])),
-        ImageQuantity("angle without drift", "y", "°", *_values(angle[0])),
-        ImageQuantity("drift", "y", "nm/s", *(metres * each for each in _values(scale[1]))),
-        ImageQuantity("drift", "x", "nm/s", *(metres * float(np.tan(each)) for each in across)),
+        ImageQuantity("scale without drift", "y", "1", *scale),
+        ImageQuantity("angle without drift", "y", "°", *angle),
+        ImageQuantity("drift", "y", "nm/s", *(metres * each for each in change)),
+        ImageQuantity("drift", "x", "nm/s", *across),
     )
 
 
-def largest(seen: Sequence[RegisteredImage]) -> RegisteredImage:
-    """Return the image of the largest range in y."""
-    return max(seen, key=lambda each: each.image.range_y)
-
-
-def _largest(seen: Sequence[RegisteredImage], *, upward: bool) -> RegisteredImage | None:
-    chosen = [each for each in seen if each.image.upward == upward]
-    return largest(chosen) if chosen else None
-
-
-def _speed(one: RegisteredImage) -> float:
-    """Commanded speed of y, m/s."""
-    return one.image.range_y / (one.image.lines * (one.image.line_time or np.inf))
-
-
-def _halves(
-    up: RegisteredImage, down: RegisteredImage, name: str
-) -> tuple[ImageQuantity, ImageQuantity]:
+def _halves(up: RegisteredImage, down: RegisteredImage, name: str) -> tuple[Interval, Interval]:
     """Half the sum and half the difference of a figure of y, upwards and downwards."""
     one, other = (
         next(each for each in seen.figures if (each.axis, each.name) == ("y", name))
         for seen in (up, down)
     )
-    half = 0.5 * float(np.hypot(_half_width(one), _half_width(other)))
-    sums = 0.5 * (one.value + other.value), 0.5 * (one.value - other.value)
-    common, apart = (ImageQuantity(name, "y", one.unit, v, v - half, v + half) for v in sums)
-    return common, apart
-
-
-def _half_width(one: ImageQuantity) -> float:
-    return 0.5 * (one.upper - one.lower)
-
-
-def _values(one: ImageQuantity) -> tuple[float, float, float]:
-    return one.value, one.lower, one.upper
+    width, wide = (0.5 * (each.upper - each.lower) for each in (one, other))
+    half = 0.5 * float(np.hypot(width, wide))
+    common, apart = 0.5 * (one.value + other.value), 0.5 * (one.value - other.value)
+    return (common, common - half, common + half), (apart, apart - half, apart + half)
 
 
 @frozen(eq=False)

@@ -13,9 +13,10 @@ algorithm: K. L. Lange, R. J. A. Little and J. M. G. Taylor, J. Am. Stat. Assoc.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
@@ -51,37 +52,20 @@ COLUMNS = 3
 """Turns in which the columns are moved one by one, before all coefficients are."""
 
 
-BEGINNING = Smoothing()
-
-
 @frozen(eq=False)
 class Registration:
     """Motion of an image in cells of its grating: ``coefficients`` (count, 2) of u and v.
 
-    ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``noise`` is the rms of the
-    heights that remains, in their unit, ``edges`` that of the places of the cells' edges, in cells.
-    ``weights`` are, for each direction, what each height counts; damaged cells
-    count little. ``shown`` (lines, 2, 2) is the information of each line on u and v, per cell
-    squared. ``pitch`` (m) is the distance between neighbouring cells.
+    ``covariance`` (2 count, 2 count) is that of u's, then of v's. ``shown`` (lines, 2, 2) is the
+    information of each line on u and v, per cell squared. ``pitch`` (m) is the distance between
+    neighbouring cells.
     """
 
     form: MotionForm
     coefficients: Array
     covariance: Array
-    cell: UnitCell
-    noise: float
-    edges: float
-    weights: Sequence[Array]
     shown: Array
     pitch: float
-
-    def image(self, direction: int) -> Array:
-        """Return u and v at all pixels of a direction: (lines, pixels, 2)."""
-        return self.form.image(direction, self.coefficients)
-
-    def uncertainty(self, direction: int) -> Array:
-        """Standard deviation, in cells, of u or v, whichever is greater: (lines, pixels)."""
-        return self.form.deviation(direction, self.covariance)
 
 
 def register(image: ScanImage, pitch: float) -> Registration:
@@ -114,8 +98,10 @@ def _begun(image: ScanImage, pitch: float) -> tuple["_State", float]:
     )
     size = int(min(FINEST, 2 * round(image.pixels / cells_across[1])))
     coefficients = carried_over(first, coefficients, form)
-    line = 0 if image.upward else -1
-    return _State.begin(form, coefficients, recorded, given, size, line), share * pitch
+    even = [np.ones_like(each) for each in given]
+    for each in even:
+        each[0 if image.upward else -1] = 0.0
+    return _State(form, coefficients, recorded, given, even, even, size), share * pitch
 
 
 def _judged(state: "_State") -> "_State":
@@ -142,7 +128,9 @@ class _State:
     """A turn: the motion, the heights without background, and the weights of the cells.
 
     ``recorded`` are the heights of the image, ``heights`` the same without background. Heights
-    count by their ``weights``, and not at all where ``steady`` is zero: in the line scanned first.
+    count by their ``weights``, and not at all where ``steady`` is zero: in the line scanned first,
+    which begins at rest. ``size`` is that of the mean cell, ``change`` the rms by which the last
+    turn moved the positions, over their standard deviation.
     """
 
     form: MotionForm
@@ -152,37 +140,22 @@ class _State:
     weights: Sequence[Array]
     steady: Sequence[Array]
     size: int
-    cell: UnitCell
     noise: float = 0.0
     edges: float = 0.0
-    smoothing: Smoothing = BEGINNING
+    smoothing: Smoothing = field(factory=Smoothing)
     change: float = np.inf
-    """Rms by which the last turn moved the positions, over their standard deviation."""
 
-    @classmethod
-    def begin(
-        cls,
-        form: MotionForm,
-        coefficients: Array,
-        recorded: Sequence[Array],
-        heights: Sequence[Array],
-        size: int,
-        first: int,
-    ) -> "_State":
-        """Begin with all cells alike; the ``first`` line, which begins at rest, does not count."""
-        even = [np.ones_like(each) for each in heights]
-        for each in even:
-            each[first] = 0.0
-        cell = mean_cell(form, coefficients, heights, even, size)
-        return cls(form, coefficients, recorded, heights, even, even, size, cell)
+    @cached_property
+    def cell(self) -> UnitCell:
+        """The mean over all cells."""
+        return mean_cell(self.form, self.coefficients, self.heights, self.weights, self.size)
 
     def by_columns(self) -> "_State":
         """Return the state whose columns have moved to where they fit best, with a ripple."""
         state = self
         for _ in range(COLUMNS):
             form, moved = with_ripple(state.form, state.coefficients, self.heights, state.cell)
-            cell = mean_cell(form, moved, self.heights, self.weights, self.size)
-            state = evolve(state, form=form, coefficients=moved, cell=cell)
+            state = evolve(state, form=form, coefficients=moved)
         return state
 
     def without_ripple(self) -> "_State":
@@ -190,8 +163,7 @@ class _State:
         form = evolve(self.form, ripple=None)
         kept = [self.coefficients[self.form.smooth_part(direction)] for direction in range(2)]
         moved = np.vstack([*kept, self.coefficients[2 * self.form.fast :]])
-        cell = mean_cell(form, moved, self.heights, self.weights, self.size)
-        return evolve(self, form=form, coefficients=moved, cell=cell)
+        return evolve(self, form=form, coefficients=moved)
 
     def mean_miss(self) -> float:
         """Mean magnitude by which the mean cell misses the heights."""
@@ -240,14 +212,11 @@ class _State:
                 self.recorded, self.heights, missed, weights, strict=True
             )
         ]
-        coefficients = self.coefficients + step
-        cell = mean_cell(self.form, coefficients, heights, weights, self.size)
         return evolve(
             self,
-            coefficients=coefficients,
+            coefficients=self.coefficients + step,
             heights=heights,
             weights=weights,
-            cell=cell,
             noise=noise,
             edges=edges,
             smoothing=smoothing if judging else self.smoothing,
@@ -293,10 +262,6 @@ class _State:
             self.form,
             self.coefficients,
             whole.uncertainty(prior, missed, self.weights, _numbers(missed, self.cell)),
-            self.cell,
-            self.noise,
-            self.edges,
-            self.weights,
             np.sum([each.information(likely) for each, likely in pairs], axis=0),
             pitch,
         )

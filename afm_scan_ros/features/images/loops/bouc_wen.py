@@ -11,7 +11,6 @@ F. Ikhouane and J. Rodellar, Arch. Comput. Methods Eng. 16 (2009) 161, section 3
 """
 
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
@@ -42,19 +41,17 @@ LEAST = 0.01
 MARGIN = 0.05
 """Share of the range of h by which the slopes reach beyond it."""
 
-Numbers: TypeAlias = tuple[float, float, float]
-"""Logarithm of beta, bend, and gamma over beta."""
-
 
 @frozen(eq=False)
 class BoucWenFit:
     """Numbers and weights (m) of x, x², x³ and h, where x is the drive scaled to -1 to 1.
 
-    ``lower`` and ``upper`` (V) are the drive's range. ``held_out`` (m) is the rms by which parts of
-    the records are missed by a fit of the others.
+    The ``numbers`` (3,) are the logarithm of beta, the bend, and gamma over beta. ``lower`` and
+    ``upper`` (V) are the drive's range. ``held_out`` (m) is the rms by which parts of the records
+    are missed by a fit of the others.
     """
 
-    numbers: Numbers
+    numbers: Array
     weights: Array
     lower: float
     upper: float
@@ -120,7 +117,7 @@ def _at_rest(slopes: DuhemSlopes) -> DuhemSlopes:
     return evolve(slopes, offset=slopes.offset - output, rest=0.0)
 
 
-def _physical(numbers: Numbers) -> Numbers:
+def _physical(numbers: Array) -> tuple[float, float, float]:
     """Beta, twice the bend, and gamma."""
     beta = float(np.exp(numbers[0]))
     return beta, 2.0 * float(numbers[1]), beta * float(numbers[2])
@@ -141,7 +138,7 @@ def hysteresis_state(inputs: Array, beta: float, bend: float, gamma: float, star
     return result
 
 
-def _repeated(inputs: Array, numbers: Numbers) -> Array:
+def _repeated(inputs: Array, numbers: Array) -> Array:
     """Value of h along inputs that begin as they were when they last passed there the same way."""
     moves = np.sign(np.diff(inputs))
     same = np.flatnonzero((inputs[:-1] == inputs[0]) & (moves == moves[0]))
@@ -166,7 +163,7 @@ class _RepeatedMotion:
     lower: float
     upper: float
 
-    def rows(self, numbers: Numbers) -> list[Swept]:
+    def rows(self, numbers: Array) -> list[Swept]:
         """Records with the columns of these numbers for areas."""
         result = []
         for one in self.records:
@@ -178,19 +175,19 @@ class _RepeatedMotion:
             result.append(evolve(one, areas=means))
         return result
 
-    def solved(self, numbers: Numbers) -> tuple[Array, Array]:
+    def solved(self, numbers: Array) -> tuple[Array, Array]:
         """Weights (m) that fit best, and what they miss, each row times its samples' root."""
         pairs = [one.weighted(self.dynamics) for one in self.rows(numbers)]
         areas, moved = (np.concatenate(each) for each in zip(*pairs, strict=True))
         weights = np.linalg.lstsq(areas, moved, rcond=None)[0]
         return weights, moved - areas @ weights
 
-    def held_out(self, numbers: Numbers, weights: Array) -> float:
+    def held_out(self, numbers: Array, weights: Array) -> float:
         """Rms (m) by which each part is missed by a fit of the others, linearised."""
         parts = loop_parts(self.rows(numbers), self.dynamics)
         jacobians = [part.areas for part in parts]
-        for k in range(len(numbers)):
-            changed = loop_parts(self.rows(_stepped(numbers, k)), self.dynamics)
+        for step in STEP * np.eye(len(numbers)):
+            changed = loop_parts(self.rows(numbers + step), self.dynamics)
             moved = [
                 (b.areas - a.areas) @ weights / STEP for a, b in zip(parts, changed, strict=True)
             ]
@@ -198,11 +195,6 @@ class _RepeatedMotion:
         missed = [part.moved - part.areas @ weights for part in parts]
         squares = sum(_predicted_squares(jacobians, missed))
         return float(np.sqrt(squares / sum(part.samples for part in parts)))
-
-
-def _stepped(numbers: Numbers, which: int) -> Numbers:
-    beta, bend, share = (each + STEP * (k == which) for k, each in enumerate(numbers))
-    return beta, bend, share
 
 
 def _predicted_squares(jacobians: Sequence[Array], missed: Sequence[Array]) -> Iterator[float]:
@@ -221,14 +213,13 @@ def fit_bouc_wen(
 ) -> BoucWenFit:
     """Fit records of repeated motion, of drives from ``lower`` to ``upper`` (V)."""
     motion = _RepeatedMotion(records, dynamics, lower, upper)
-    size = float(np.linalg.norm(motion.solved((0.0, 0.0, 0.0))[1]))
+    size = float(np.linalg.norm(motion.solved(np.zeros(3))[1]))
 
-    def missed(values: Array) -> Array:
-        return motion.solved((values[0], values[1], values[2]))[1] / size
+    def missed(numbers: Array) -> Array:
+        return motion.solved(numbers)[1] / size
 
     begun = [np.array([np.log(start), 0.0, 0.0]) for start in STARTS]
     found = [least_squares(missed, b, bounds=(LOWEST, HIGHEST), diff_step=1e-3) for b in begun]
-    best = min(found, key=lambda each: float(each.cost)).x
-    numbers = float(best[0]), float(best[1]), float(best[2])
+    numbers = min(found, key=lambda each: float(each.cost)).x
     weights = motion.solved(numbers)[0]
     return BoucWenFit(numbers, weights, lower, upper, motion.held_out(numbers, weights))

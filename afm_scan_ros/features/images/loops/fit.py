@@ -115,6 +115,10 @@ class _Fold:
     lower: float
     upper: float
 
+    def __add__(self, other: "_Fold") -> "_Fold":
+        ends = min(self.lower, other.lower), max(self.upper, other.upper)
+        return _Fold(self.equations + other.equations, *ends)
+
     def within(self, others: Sequence["_Fold"]) -> bool:
         """Whether the others' drives reach as far: no record predicts beyond its drive."""
         near = ALIKE * (self.upper - self.lower)
@@ -142,7 +146,11 @@ def _each_and_others(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_
 
 def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[_Fold]:
     """Pieces of like amplitude together; each alone where no amplitude lies within others."""
-    pieces = [fold for one in records for fold in _pieces_of(one, dynamics)]
+    parts = (part for one in records for part in one.parts(dynamics))
+    pieces = [
+        _Fold(NormalEquations.of(each.areas, each.moved, each.samples), each.lower, each.upper)
+        for each in parts
+    ]
     width = max(fold.upper for fold in pieces) - min(fold.lower for fold in pieces)
     groups: list[list[_Fold]] = []
     for piece in pieces:
@@ -153,28 +161,9 @@ def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[_Fold]:
                 break
         else:
             groups.append([piece])
-    joined = [_joined(group) for group in groups]
+    joined = [reduce(add, group) for group in groups]
     covered = any(each.within(others) for each, others in _each_and_others(joined) if others)
     return joined if covered else pieces
-
-
-def _joined(group: Sequence[_Fold]) -> _Fold:
-    return _Fold(
-        reduce(add, (fold.equations for fold in group)),
-        min(fold.lower for fold in group),
-        max(fold.upper for fold in group),
-    )
-
-
-def _pieces_of(one: Swept, dynamics: LinearDynamics) -> Iterator[_Fold]:
-    areas, moved = one.regression(dynamics)
-    drive = one.record.drive[: len(one.moved) * one.every].reshape(len(one.moved), -1)
-    drive = drive[one.measured]
-    for part in moving.parts_of([len(moved)]):
-        samples = one.samples[one.measured][part]
-        rows = moving.centred(areas[part], moved[part], samples)
-        equations = NormalEquations.of(*rows, float(samples.sum()))
-        yield _Fold(equations, float(drive[part].min()), float(drive[part].max()))
 
 
 def held_out_by_density(

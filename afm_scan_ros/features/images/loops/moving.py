@@ -10,11 +10,11 @@ from attrs import define, evolve, frozen
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
 from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import CellGrid, swept_areas
 
@@ -22,8 +22,6 @@ ROWS = 4_000
 """Rows of all records together, to which they are averaged; it bounds time and memory of a fit."""
 LOOP, RINGING = 40, 400
 """Rows of a swing that show its loop, and those that show what rings after its turns."""
-AT_TURN = 0.01
-"""Share of its range by which a drive turns back before that counts as a turn."""
 PIECES = 8
 """Parts of a record, of which each can be predicted from the others."""
 
@@ -55,8 +53,8 @@ class MovingRecord:
     @property
     def swings(self) -> float:
         """Swings of the drive, there and back, a second."""
-        turns = _turns(self.drive, AT_TURN * float(np.ptp(self.drive)))
-        return max(turns, 1) / 2.0 / (len(self.drive) * self.sample_period)
+        ways = 1 + len(turning_points(self.drive))
+        return ways / 2.0 / (len(self.drive) * self.sample_period)
 
 
 @frozen
@@ -65,6 +63,21 @@ class LinearDynamics:
 
     vibration: VibrationModel
     creep: CreepModel
+
+
+@frozen(eq=False)
+class LoopPart:
+    """Areas (n, p) and displacement (n,), m, of one stretch of a loop in all records that have it.
+
+    Each record's are without their means, times the root of the samples of a row; they count
+    ``samples``. The drive is from ``lower`` to ``upper`` (V).
+    """
+
+    areas: Array
+    moved: Array
+    samples: float
+    lower: float
+    upper: float
 
 
 @define(frozen=True, eq=False, slots=False)
@@ -99,6 +112,17 @@ class Swept:
     def weighted(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
         """The same with each row times the root of its samples, so that squares count samples."""
         return centred(*self.regression(dynamics), self.samples[self.measured])
+
+    def parts(self, dynamics: LinearDynamics) -> Iterator[LoopPart]:
+        """Yield equal parts of the record."""
+        areas, moved = self.regression(dynamics)
+        samples = self.samples[self.measured]
+        drive = self.record.drive[: len(self.moved) * self.every].reshape(len(self.moved), -1)
+        drive = drive[self.measured]
+        for part in parts_of([len(moved)]):
+            rows = centred(areas[part], moved[part], samples[part])
+            ends = float(drive[part].min()), float(drive[part].max())
+            yield LoopPart(*rows, float(samples[part].sum()), *ends)
 
     @property
     def counted(self) -> float:
@@ -190,47 +214,16 @@ def parts_of(lengths: Sequence[int]) -> list[slice]:
     return found
 
 
-@frozen(eq=False)
-class LoopPart:
-    """Areas (n, p) and displacement (n,), m, of one stretch of a loop in all records that have it.
-
-    Each record's are without their means, times the root of the samples of a row; they count
-    ``samples``.
-    """
-
-    areas: Array
-    moved: Array
-    samples: float
-
-
 def loop_parts(records: Sequence[Swept], dynamics: LinearDynamics) -> list[LoopPart]:
     """Eighths of each loop; records whose drive has the same range share theirs."""
     groups: dict[tuple[float, int], list[LoopPart]] = {}
     for one in records:
-        areas, moved = one.regression(dynamics)
-        samples = one.samples[one.measured]
-        for number, part in enumerate(parts_of([len(moved)])):
-            found = LoopPart(
-                *centred(areas[part], moved[part], samples[part]), float(samples[part].sum())
-            )
-            groups.setdefault((float(np.ptp(one.record.drive)), number), []).append(found)
+        for number, part in enumerate(one.parts(dynamics)):
+            groups.setdefault((float(np.ptp(one.record.drive)), number), []).append(part)
     return [_together(group) for group in groups.values()]
 
 
 def _together(group: Sequence[LoopPart]) -> LoopPart:
     areas, moved = (np.concatenate([getattr(p, n) for p in group]) for n in ("areas", "moved"))
-    return LoopPart(areas, moved, sum(part.samples for part in group))
-
-
-@compiled
-def _turns(drive: Array, least: float) -> int:
-    """Count the turns of a drive, of which each goes back by more than ``least`` (V)."""
-    turns, way, far = 0, 0, drive[0]
-    for k in range(len(drive)):
-        if way * (drive[k] - far) >= 0.0 and way != 0:
-            far = drive[k]
-        elif abs(drive[k] - far) > least:
-            way = 1 if drive[k] > far else -1
-            far = drive[k]
-            turns += 1
-    return turns
+    ends = min(part.lower for part in group), max(part.upper for part in group)
+    return LoopPart(areas, moved, sum(part.samples for part in group), *ends)

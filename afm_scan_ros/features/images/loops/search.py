@@ -6,21 +6,21 @@ the grid of the density and are found on a coarse one. A resonance shows by its 
 moves: no free decay is asked for, as images show no turns.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
 from operator import add
+from typing import TypeAlias
 
 import numpy as np
 from attrs import evolve, frozen
 from scipy.optimize import least_squares
 from scipy.signal import argrelmin
-from scipy.stats import t as student
 
 from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
-from afm_scan_ros.core.fit.signals import correlation_length
+from afm_scan_ros.core.fit.likeness import jackknife
+from afm_scan_ros.core.fit.noise import correlation_length
 from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import NormalEquations, solve
@@ -37,7 +37,10 @@ GAINS = np.array([0.0, 0.02, 0.5])
 """Least, first and greatest gain of the creep."""
 CREEPS = np.array([0.01, 0.2, 1.0])
 """Least, first and greatest time constant of the creep, in lengths of the longest record."""
-LEVEL = 0.975
+RATIO = 1.06
+"""Ratio of neighbouring frequencies that are tried."""
+DAMPINGS = np.log([1e-3, 0.02, 0.5])
+"""Least, first and greatest logarithm of the damping ratio."""
 QUADRATIC = 3.0
 """Difference of two grids over the error of the finer one, of half the width."""
 FARTHEST = np.log(1e3)
@@ -50,25 +53,7 @@ def at_once(gain: float, period: float) -> VibrationModel:
     return VibrationModel((gain,), (float(LAGS[0]) * period, 1.0))
 
 
-class Form(ABC):
-    """A vibration or a creep of some numbers; ``bounds`` (3, numbers): least, first, greatest."""
-
-    bounds: Array
-
-    @abstractmethod
-    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
-        """Return the dynamics with this form of these values in its place."""
-
-    @abstractmethod
-    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
-        """95 % intervals of the parameters, from the half-widths of the values."""
-
-    @abstractmethod
-    def identified(self, values: Array, half: Array) -> bool:
-        """Whether the records distinguish it from no such effect."""
-
-
-class Lag(Form):
+class Lag:
     """G = 1/(1 + s τ), of the logarithm of τ."""
 
     def __init__(self, records: Sequence[MovingRecord]) -> None:
@@ -90,7 +75,7 @@ class Lag(Form):
         return bool(half[0] < 1.0)
 
 
-class OneCreep(Form):
+class OneCreep:
     """One spring and damper, Gc = 1 + g/(1 + s τ), of g and the logarithm of τ."""
 
     def __init__(self, records: Sequence[MovingRecord]) -> None:
@@ -112,6 +97,37 @@ class OneCreep(Form):
     def identified(self, values: Array, half: Array) -> bool:
         """Whether the gain is above zero."""
         return bool(values[0] > half[0])
+
+
+class ResonanceForm:
+    """G = 1/(1 + 2ζs/ω + s²/ω²), of the logarithms of ω near a first one (Hz), and of ζ."""
+
+    def __init__(self, hertz: float) -> None:
+        first = np.log(2.0 * np.pi * hertz)
+        near = 2.0 * np.log(RATIO)
+        self.bounds = np.column_stack([[first - near, first, first + near], DAMPINGS])
+
+    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
+        """Put the resonance in the vibration's place."""
+        omega, zeta = (float(each) for each in np.exp(values))
+        mode = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
+        return evolve(dynamics, vibration=mode)
+
+    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
+        """Intervals of frequency (Hz) and damping (1)."""
+        hertz = float(values[0] - np.log(2.0 * np.pi))
+        return (
+            of_logarithm("resonance", hertz, half[0], "Hz"),
+            of_logarithm("damping", values[1], half[1], "1"),
+        )
+
+    def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
+        """Whether the frequency is known as finely as it was tried."""
+        return bool(half[0] < np.log(RATIO))
+
+
+Form: TypeAlias = Lag | OneCreep | ResonanceForm
+"""A vibration or a creep of some numbers; ``bounds`` (3, numbers): least, first, greatest."""
 
 
 @frozen(eq=False)
@@ -177,7 +193,7 @@ def search(
     first = first if coarser is None else coarser
     found = least_squares(residual, first, bounds=(lowest, highest), diff_step=1e-3, xtol=1e-3)
     best = require_converged(found, "vibration and creep of records")
-    half = _jackknife(evidence.pieces(), found.jac, found.fun)
+    half = jackknife(evidence.pieces(), found.jac, found.fun)
     if coarser is not None:
         half = half + np.abs(best - coarser) / QUADRATIC
     reach = np.where(found.active_mask == 0, half, np.inf)  # at a bound the best may lie beyond
@@ -210,22 +226,6 @@ def _parts(values: Array, forms: Sequence[Form]) -> list[Array]:
     return np.split(values, np.cumsum([form.bounds.shape[1] for form in forms])[:-1])
 
 
-def _jackknife(groups: Sequence[slice], jacobian: Array, residual: Array) -> Array:
-    """Half-widths of 95 % intervals, (p,), by a residual (n,) and its jacobian (n, p).
-
-    The jackknife that leaves out a group at a time, linearised (J. G. MacKinnon, M. Ø. Nielsen and
-    M. D. Webb, J. Econometrics 232, 272, 2023, Eq. 13): unlike the sandwich it is not too narrow
-    where groups are few or unlike.
-    """
-    whole, count = jacobian.T @ jacobian, len(groups)
-    moved = []
-    for rows in groups:
-        along = jacobian[rows]
-        moved.append(np.linalg.pinv(whole - along.T @ along) @ (along.T @ residual[rows]))
-    spread = np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
-    return np.asarray(student.ppf(LEVEL, count - 1) * np.sqrt(spread * (count - 1) / count))
-
-
 def of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterInterval:
     """Interval of a number whose logarithm was sought, open where that may be anything."""
     if half > FARTHEST:
@@ -233,43 +233,12 @@ def of_logarithm(name: str, value: float, half: float, unit: str) -> ParameterIn
     return closed(name, (float(np.exp(value - half)), float(np.exp(value + half))), unit)
 
 
-RATIO = 1.06
-"""Ratio of neighbouring frequencies that are tried."""
 BEST = 3
 """Frequencies tried from which a search begins."""
-DAMPINGS = np.log([1e-3, 0.02, 0.5])
-"""Least, first and greatest logarithm of the damping ratio."""
 CYCLES = 3.0
 """Fewest cycles in a swing, as a loop bends less often."""
 ROWS_A_CYCLE = 4.0
 """Fewest rows of a cycle that show it."""
-
-
-class ResonanceForm(Form):
-    """G = 1/(1 + 2ζs/ω + s²/ω²), of the logarithms of ω near a first one (Hz), and of ζ."""
-
-    def __init__(self, hertz: float) -> None:
-        first = np.log(2.0 * np.pi * hertz)
-        near = 2.0 * np.log(RATIO)
-        self.bounds = np.column_stack([[first - near, first, first + near], DAMPINGS])
-
-    def put(self, dynamics: LinearDynamics, values: Array) -> LinearDynamics:
-        """Put the resonance in the vibration's place."""
-        omega, zeta = (float(each) for each in np.exp(values))
-        mode = VibrationModel((1.0,), (1.0 / omega**2, 2.0 * zeta / omega, 1.0))
-        return evolve(dynamics, vibration=mode)
-
-    def intervals(self, values: Array, half: Array) -> tuple[ParameterInterval, ...]:
-        """Intervals of frequency (Hz) and damping (1)."""
-        hertz = float(values[0] - np.log(2.0 * np.pi))
-        return (
-            of_logarithm("resonance", hertz, half[0], "Hz"),
-            of_logarithm("damping", values[1], half[1], "1"),
-        )
-
-    def identified(self, values: Array, half: Array) -> bool:  # noqa: ARG002 - as of every form
-        """Whether the frequency is known as finely as it was tried."""
-        return bool(half[0] < np.log(RATIO))
 
 
 def rippling(swept: Sequence[Swept], smoothing: float, known: LinearDynamics) -> Found | None:

@@ -16,8 +16,8 @@ from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     UNEXPLAINED,
 )
 from afm_scan_ros.core.effects.registry import CATALOGUE
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, GREY, LIGHT_BLUE, ORANGE
-from afm_scan_ros.report.style import styled
 from afm_scan_ros.report.table import Row
 
 OUTSIDE, SEVERAL = "outside the catalogue", "several"

@@ -15,11 +15,11 @@ from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.drivers import AxisSettings, DriverChoice, Reading, ScannerSettings
 from afm_scan_ros.drivers.link import Link
 from afm_scan_ros.drivers.simulated import SimulatedScanner
-from afm_scan_ros.nodes import piezoscanner_sim
-from afm_scan_ros.nodes.excitation_generator import ExcitationGenerator
+from afm_scan_ros.nodes.block_source import ExcitationGenerator
 from afm_scan_ros.nodes.run import run_node
 from afm_scan_ros.nodes.scan_node import ScanNode
 from afm_scan_ros.nodes.scan_recorder import ScanRecorder
+from afm_scan_ros.nodes.scanner_node import PiezoscannerSim
 
 FAULT_AT = 20_000
 """Sample from which there is a fault: after a second."""
@@ -243,9 +243,9 @@ def faulty_node(name: str, log: str) -> int:
     """Run the scanner's node with a fault in it; return its status."""
     fault = BY_NAME[name]
     if fault.method and fault.to == "node":
-        _break(piezoscanner_sim.PiezoscannerSim, fault.method, fault.act, log)
+        _break(PiezoscannerSim, fault.method, fault.act, log)
     watch_the_sensor(f"{__name__}:{fault.driver}" if fault.driver else "")
-    return run_node(piezoscanner_sim.PiezoscannerSim.NAME)
+    return run_node(PiezoscannerSim.NAME)
 
 
 def faulty_neighbour(name: str, log: str) -> int:
@@ -258,10 +258,10 @@ def faulty_neighbour(name: str, log: str) -> int:
 
 def watch_the_sensor(driver: str = "") -> None:
     """Check the readings of the simulated sensor, as those of a real one, by another ``driver``."""
-    kind = piezoscanner_sim.PiezoscannerSim
+    kind = PiezoscannerSim
     whole = kind.choice
 
-    def choice(node: piezoscanner_sim.PiezoscannerSim) -> DriverChoice:
+    def choice(node: PiezoscannerSim) -> DriverChoice:
         given = whole(node)
         watched = evolve(
             given.settings,

@@ -23,11 +23,9 @@ from afm_scan_ros.features.images.files.channels import image_channels
 from afm_scan_ros.features.images.files.formats import write_image
 from afm_scan_ros.features.images.scan_image import ScanImage
 from afm_scan_ros.files import share_directory
-from afm_scan_ros.files.drive_files import read_drive
-from afm_scan_ros.files.learned_file import load_learned, save_learned
+from afm_scan_ros.files.drive_files import load_learned, read_drive, save_learned
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_plant, load_scan
-from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.files.plant_file import load_plant, load_sample, load_scan
 from afm_scan_ros.report.table import Row
 
 TRIALS = 8000

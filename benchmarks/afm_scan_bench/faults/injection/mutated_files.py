@@ -22,12 +22,12 @@ from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files import share_directory
+from afm_scan_ros.files.arrays import load_sealed
 from afm_scan_ros.files.model_file import load_model, model_hash
-from afm_scan_ros.files.model_pair import load_sealed
 from afm_scan_ros.files.plant_file import PARAMETERS, load_plant, load_scan
 from afm_scan_ros.files.records import to_mapping
 from afm_scan_ros.files.yaml import save
-from afm_scan_ros.nodes.flow import FLOW
+from afm_scan_ros.nodes.parameters import FLOW
 from afm_scan_ros.report.table import Row
 from afm_scan_ros.simulation.scanner import Piezoscanner
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from attrs import frozen
 
+from afm_scan_ros.nodes import NODES as MODULES
+
 NODES = (
     "trajectory_generator",
     "inversion_compensator",
@@ -28,7 +30,7 @@ INCOMPLETE = 3
 NO_LIMIT = resource.RLIM_INFINITY
 
 FORKING = multiprocessing.get_context("forkserver")
-FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{name}" for name in NODES])
+FORKING.set_forkserver_preload([f"afm_scan_ros.nodes.{MODULES[name]}" for name in NODES])
 
 
 @frozen(eq=False)

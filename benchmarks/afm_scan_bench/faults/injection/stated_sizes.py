@@ -24,11 +24,9 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.arrays import FREE, Archive
-from afm_scan_ros.files.drive_files import read_drive
-from afm_scan_ros.files.learned_file import load_learned
+from afm_scan_ros.files.drive_files import load_learned, read_drive
 from afm_scan_ros.files.model_file import load_model
-from afm_scan_ros.files.plant_file import load_plant, load_scan
-from afm_scan_ros.files.sample_file import load_sample
+from afm_scan_ros.files.plant_file import load_plant, load_sample, load_scan
 from afm_scan_ros.files.tables import read_archive, read_array, read_matlab
 from afm_scan_ros.report.table import Row
 

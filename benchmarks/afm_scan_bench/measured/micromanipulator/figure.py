@@ -14,8 +14,8 @@ from afm_scan_bench.measured.micromanipulator.study import (
     Study,
 )
 from afm_scan_ros.core.types import Array
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, GREY, LIGHT_ORANGE, ORANGE
-from afm_scan_ros.report.style import styled
 
 GROWING, BACK = JUDGED[0], JUDGED[-1]
 

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from afm_scan_bench.measured.mirror.recordings import AMPLITUDES, identified, spectra
 from afm_scan_bench.measured.mirror.response_matrix import ResponseMatrix, response_matrix
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
+from afm_scan_ros.report.paper import styled
 from afm_scan_ros.report.picture import BLUE, GREY, LIGHT_BLUE, LIGHT_ORANGE, ORANGE
-from afm_scan_ros.report.style import styled
 
 MICRO = 1e6
 COLOURS = dict(zip(AMPLITUDES, (LIGHT_BLUE, BLUE, ORANGE), strict=True))

@@ -12,7 +12,11 @@ from attrs import frozen
 import afm_scan_ros as afm
 from afm_scan_bench.measured.recordings import measured_data
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.spectra import PeriodicRecords, periodic_records
+from afm_scan_ros.core.identification.state_space.spectra import (
+    PeriodicRecords,
+    Periods,
+    periodic_records,
+)
 from afm_scan_ros.core.types import Array
 
 AMPLITUDES = (100, 200, 300)
@@ -110,7 +114,7 @@ def spectra(amplitude: int) -> PeriodicRecords:
     found = measured(amplitude)
     frequency = np.fft.rfftfreq(SHAPE[0], SAMPLE_PERIOD)
     used = (frequency > 0.0) & (frequency < HIGHEST)
-    return periodic_records(found.drive, found.output, SAMPLE_PERIOD, used)
+    return periodic_records(Periods(found.drive, found.output, SAMPLE_PERIOD, used))
 
 
 @frozen

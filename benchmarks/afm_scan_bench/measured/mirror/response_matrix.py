@@ -4,9 +4,8 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.state_space.model import Complex
 from afm_scan_ros.core.identification.state_space.spectra import PeriodicRecords, smooth
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Complex
 
 
 @frozen(eq=False)
