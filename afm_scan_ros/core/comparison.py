@@ -155,4 +155,5 @@ def _limit(model: ScannerModel, scan: Scan, axis: str) -> float:
         )
     resonance = resonance_of(model.axis(axis).vibration, scan.spec.sample_period)
     moved = scan.measured.axis(axis)
-    return detection_limit(known, moved, scan.spec.sample_period, resonance).total
+    spread = model.axis(axis).spread
+    return detection_limit(known, moved, scan.spec.sample_period, resonance, spread).total

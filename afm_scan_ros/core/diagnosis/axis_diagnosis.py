@@ -25,7 +25,7 @@ from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
 from afm_scan_ros.core.diagnosis.settings import PARTING
 from afm_scan_ros.core.diagnosis.structure import refit_of
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, TYPICAL_SHARE
+from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
@@ -143,7 +143,7 @@ class AxisDiagnosis:
         if selection.selected is None:
             return INSUFFICIENT if self._still else SUFFICIENT
         certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
-        doubtful = not certain or self.synchronous_places or self.untested
+        doubtful = not certain or self.synchronous_places or self.like_own_error
         return AMBIGUOUS if doubtful else FOUND
 
     @property
@@ -151,12 +151,16 @@ class AxisDiagnosis:
         """Whether no cell lacks anything.
 
         The stated error of a formula holds inside the ranges of its parameters. At an end of a
-        range the formula counts as exact.
+        range the formula counts as exact. An effect must leave as little as if the model's error
+        were well known: the more of it were left, the less would it tell from that error.
         """
         selected, reached = self.selection.selected, self.selection.reached
-        if selected and selected.at_end:
+        if selected is None:
+            return reached.adequate
+        reached = evolve(reached, known=np.maximum(reached.known, KNOWN_FREEDOM))
+        if selected.at_end:
             exact = np.concatenate([each.variance.total for each in self.evidence])
-            return evolve(reached, variance=exact).adequate
+            reached = evolve(reached, variance=exact)
         return reached.adequate
 
     @property
@@ -167,12 +171,21 @@ class AxisDiagnosis:
 
     @property
     def untested(self) -> bool:
-        """Whether the model's error is not known for the motion of a record.
-
-        It may then be many times the limit, and look like an effect: a hysteresis that was
-        identified from other loops errs as one whose gain has changed.
-        """
+        """Whether the model's error is not known for the motion of a record."""
         return any(each.untested for each in self.evidence)
+
+    @property
+    def like_own_error(self) -> bool:
+        """Whether a selected effect may be the model's error, which is not known for the motion.
+
+        A hysteresis that was identified from other loops errs as one whose gain has changed. A
+        disturbance away from the motion's harmonics is no such error.
+        """
+        selected = self.selection.selected
+        every = selected.candidates if selected else ()
+        return self.untested and not all(
+            any(parameter.located for parameter in each.form.parameters) for each in every
+        )
 
     @property
     def final(self) -> Chain:

@@ -31,6 +31,7 @@ from afm_scan_ros.core.model import (
     band_edges,
     edge_at,
 )
+from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array, floats
 
 AT_LIMIT = 1.8
@@ -41,10 +42,6 @@ HARMONIC_SHARE = 0.5
 """Largest share of a slow motion's error in the harmonics, in the band above it."""
 FIRST_CYCLES, UNPREPARED_FACTOR = 3.0, 3.0
 """First cycles of a record without a preparation, and the factor of its error there."""
-LEAST_MOTION_SHARE = 0.03
-"""Smallest share of a record's motion in a band for which its error there is used."""
-LARGEST_MISSED_SHARE = 0.1
-"""Largest relative error there; a larger one comes from slower motion, where the record moved."""
 LEAST_MOVED = 0.2
 """Least share of a record's largest band that counts as motion in a band. The harmonics of a
 triangle, at most a ninth, are no further rate."""
@@ -108,17 +105,23 @@ class DetectionLimit:
 
 
 def detection_limit(
-    known: Sequence[ModelDiscrepancy], displacement: Array, sample_period: float, resonance: float
+    known: Sequence[ModelDiscrepancy],
+    displacement: Array,
+    sample_period: float,
+    resonance: float,
+    stated: Spread | None = None,
 ) -> DetectionLimit:
     """Detection limit of a record of ``displacement`` (n,) in m under a model of ``known`` errors.
 
-    ``resonance`` (Hz) is the first of the model.
-    The first discrepancy is that of the validation record. The error of a band is interpolated
-    over amplitude between all records that moved in it. Harmonics add up to half of a slow
-    motion's error to the next band, because the error of the hysteresis is not sinusoidal. From
-    ``VIBRATING`` Hz on the largest share of all records counts: unmodelled modes dominate there,
-    and not every drive excites them. A record of the same kind of motion tells the error itself.
-    Records that were fitted tell no error of other motion, unless there are no others.
+    ``resonance`` (Hz) is the first of the model. A record of the same kind of motion tells the
+    error itself. For other motion it is a share of the motion in each band, by the amplitude
+    between the records that moved there, and at least a share of the whole motion, the least of
+    all records: what any of them leaves there contains its creep and its harmonics. The share that
+    a model ``stated`` beyond its parameters adds to it. Harmonics hold up to half of an
+    error in the next band, because the error of the hysteresis is not sinusoidal. From
+    ``VIBRATING`` on at least the largest share of all records counts: unmodelled modes dominate
+    there, and not every drive excites them. Records that were fitted tell no error of other motion,
+    unless there are no others.
     """
     edges = np.array(band_edges(sample_period, resonance))
     moved = rms_by_band(displacement, edges, sample_period)
@@ -126,14 +129,10 @@ def detection_limit(
     every = [_BandDiscrepancy.of(each, edges) for each in known]
     if alike := [part for part in every if part.alike(moved)]:
         error = np.max([part.larger(moved) for part in alike], axis=0)
-        return DetectionLimit(edges, np.hypot(error, noise), noise, resonance)
-    parts = [part for part in every if not part.fitted] or every
-    error = np.array([_interpolated(parts, moved, band) for band in range(len(moved))])
-    shares = np.array([part.rms / part.displacement for part in parts])
-    vibrating = _vibrating(edges, resonance)
-    slow = np.where(vibrating, 0.0, error)
-    error = np.maximum(error, _harmonics(slow, moved, shares[0]))
-    error[vibrating] = np.maximum(error, MISSED_FACTOR * shares.max(axis=0) * moved)[vibrating]
+    else:
+        parts = [part for part in every if not part.fitted] or every
+        beyond = np.array(stated.shares)[_places(stated.bands, edges)] if stated else 0.0
+        error = _of_other_motion(parts, moved, beyond * moved, _vibrating(edges, resonance))
     return DetectionLimit(edges, np.hypot(error, noise), noise, resonance)
 
 
@@ -156,15 +155,40 @@ def _white(rms: float, edges: Array) -> Array:
     return np.asarray(rms * np.sqrt(np.diff(edges) / edges[-1]))
 
 
-def _harmonics(error: Array, moved: Array, shares: Array) -> Array:
-    """Largest error (bands,) in m from harmonics of the motion in the band below.
+def _places(bands: Sequence[float], edges: Array) -> NDArray[np.intp]:
+    """Places among other ``bands`` of the middles of those between n + 1 edges (Hz), (n,)."""
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    return np.clip(np.searchsorted(bands, middles) - 1, 0, len(bands) - 2)
 
-    ``error`` (bands,) in m is that of slow motions, 0 in the bands of vibration. Creep and drift
-    dominate the first band and have no harmonics, so the second band's share is used there.
+
+def _of_other_motion(
+    parts: Sequence["_BandDiscrepancy"], moved: Array, stated: Array, vibrating: NDArray[np.bool_]
+) -> Array:
+    """Rms error (bands,) in m of a motion, by records of other motion and what is ``stated``."""
+    least = np.min([part.of_whole(moved) for part in parts], axis=0)
+    error = np.hypot(np.maximum(_of_motion(parts, moved), least), stated)
+    for above in 1 + np.flatnonzero(~vibrating[:-1]):
+        error[above] = max(error[above], HARMONIC_SHARE * error[above - 1])
+    missed = MISSED_FACTOR * np.max([part.shares for part in parts], axis=0) * moved
+    return np.asarray(np.where(vibrating, np.maximum(error, missed), error))
+
+
+def _of_motion(parts: Sequence["_BandDiscrepancy"], moved: Array) -> Array:
+    """Rms error (bands,) in m of a motion, as a share of it by the records that moved in a band.
+
+    The share is interpolated over the amplitude, as the relative error of hysteresis depends on
+    it, and is the largest of all bands where no record moved.
     """
-    harmonics = HARMONIC_SHARE * np.append(0.0, error[:-1])
-    harmonics[1:2] = moved[:1] * shares[1:2]
-    return harmonics
+    parts = sorted(parts, key=lambda part: part.amplitude)
+    moving = np.array([part.moving for part in parts])
+    shares = np.array([part.shares for part in parts])
+    sizes = np.log([part.amplitude for part in parts])
+    here, most = np.log(np.linalg.norm(moved) + SMALLEST), np.max(shares, where=moving, initial=0.0)
+    told = [
+        np.interp(here, sizes[k], share[k]) if k.any() else most
+        for share, k in zip(shares.T, moving.T, strict=True)
+    ]
+    return np.asarray(moved * np.array(told))
 
 
 @frozen(eq=False)
@@ -178,8 +202,7 @@ class _BandDiscrepancy:
 
     @classmethod
     def of(cls, known: ModelDiscrepancy, edges: Array) -> "_BandDiscrepancy":
-        centres = 0.5 * (edges[1:] + edges[:-1])
-        band = np.clip(np.searchsorted(known.bands, centres) - 1, 0, len(known.rms) - 1)
+        band = _places(known.bands, edges)
         rms, displacement = np.array(known.rms)[band], np.array(known.displacement)[band]
         amplitude = float(np.linalg.norm(known.displacement))
         return cls(rms, np.maximum(displacement, SMALLEST), max(amplitude, SMALLEST), known.fitted)
@@ -191,32 +214,24 @@ class _BandDiscrepancy:
         larger, smaller = (which(moved, own)[counts] for which in (np.maximum, np.minimum))
         return bool(np.all(larger <= ALIKE * smaller))
 
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Whether the record moved in each band, (bands,)."""
+        least = max(LEAST_MOVED * self.displacement.max(), 2.0 * SMALLEST)
+        return np.asarray(self.displacement >= least)
+
+    @property
+    def shares(self) -> Array:
+        """Rms error over the motion in each band, (bands,)."""
+        return self.rms / self.displacement
+
+    def of_whole(self, moved: Array) -> Array:
+        """Rms error (bands,) in m of another motion of ``moved`` (bands,) in m, as its share."""
+        return np.asarray(self.rms * (np.linalg.norm(moved) / self.amplitude))
+
     def larger(self, moved: Array) -> Array:
         """Rms error (bands,) in m of motion alike, which may be the larger one."""
-        whole = float(np.linalg.norm(moved)) / self.amplitude
-        return np.asarray(self.rms * max(whole, 1.0))
-
-    def informative(self, band: int) -> bool:
-        """Whether the error in a band is of motion there, and not of slower motion."""
-        moved = self.displacement[band]
-        if moved >= LEAST_MOVED * self.displacement.max():
-            return True
-        weak = moved <= LEAST_MOTION_SHARE * self.amplitude
-        return not weak and bool(self.rms[band] < LARGEST_MISSED_SHARE * moved)
-
-    def error(self, moved: Array, band: int) -> float:
-        """Rms error (m) in a band of a motion of ``moved`` (bands,) in m."""
-        whole = np.linalg.norm(moved) / self.amplitude
-        return float(self.rms[band] * max(moved[band] / self.displacement[band], whole))
-
-
-def _interpolated(parts: Sequence[_BandDiscrepancy], moved: Array, band: int) -> float:
-    """Error in a band by the amplitude of the motion, between the records that moved in it."""
-    informative = [part for part in parts[1:] if part.informative(band)]
-    informative = sorted([parts[0], *informative], key=lambda part: part.amplitude)
-    here = np.log(np.linalg.norm(moved) + SMALLEST)
-    amplitudes = np.log([part.amplitude for part in informative])
-    return float(np.interp(here, amplitudes, [part.error(moved, band) for part in informative]))
+        return np.maximum(self.rms, self.of_whole(moved))
 
 
 FINER = 4

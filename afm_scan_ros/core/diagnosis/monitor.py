@@ -79,7 +79,9 @@ def expected_limits(model: ScannerModel, spec: ScanSpec) -> dict[str, DetectionL
                 " large: identify it anew, with its validation record, or scan unwatched"
             )
         resonance = resonance_of(model.axis(name).vibration, spec.sample_period)
-        limits[name] = detection_limit(known, path.axis(name), spec.sample_period, resonance)
+        limits[name] = detection_limit(
+            known, path.axis(name), spec.sample_period, resonance, model.axis(name).spread
+        )
     return limits
 
 

@@ -54,8 +54,7 @@ def estimate_initial_state(
     """Estimate the initial hysteresis state of one axis of a record."""
     surface = chain.model.hysteresis.forward
     opening = _opening(view)
-    resonance = resonance_of(chain.model.vibration, view.sample_period)
-    limit = detection_limit(known, opening.measured, view.sample_period, resonance)
+    limit = _limit_of(chain, opening, known)
 
     def misfit(initial_state: InitialState) -> float:
         normalised_residual = Evidence(Playback(opening, initial_state), limit).normalised_residual(
@@ -123,7 +122,7 @@ def evidence_of(axis: str, model: ScannerModel, observed: Record, number: int = 
     playback = _playback(chain, view, known, observed)
     limit = _detection_limit(playback, chain, known)
     untested = _untested(playback, chain, known, limit)
-    if not observed.scan:
+    if not (observed.scan or observed.depolarised):
         limit = limit.unprepared(len(view.measured) * view.sample_period)
     cells = RecordCells(limit.edges, len(view.drive), view.sample_period)
     part, exact = _repeated(observed, view.drive), observed.scan is not None
@@ -171,11 +170,15 @@ def _playback(
 def _detection_limit(
     playback: Playback, chain: Chain, known: Sequence[ModelDiscrepancy]
 ) -> DetectionLimit:
-    view = playback.view
-    resonance = resonance_of(chain.model.vibration, view.sample_period)
-    limit = detection_limit(known, view.measured, view.sample_period, resonance)
+    limit = _limit_of(chain, playback.view, known)
     between = error_between_levels(playback, chain)
-    return limit.at_least(rms_by_band(between, limit.edges, view.sample_period))
+    return limit.at_least(rms_by_band(between, limit.edges, playback.view.sample_period))
+
+
+def _limit_of(chain: Chain, view: AxisSignals, known: Sequence[ModelDiscrepancy]) -> DetectionLimit:
+    resonance = resonance_of(chain.model.vibration, view.sample_period)
+    stated = chain.model.spread
+    return detection_limit(known, view.measured, view.sample_period, resonance, stated)
 
 
 def _untested(

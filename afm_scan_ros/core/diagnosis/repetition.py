@@ -6,18 +6,20 @@ is the rest. The parting is an orthogonal projection.
 """
 
 import math
+from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from scipy.fft import dct, idct
+from scipy.fft import dct, idct, next_fast_len
 from scipy.optimize import minimize_scalar
 
+from afm_scan_ros.core.bands import fast_length
 from afm_scan_ros.core.diagnosis.settings import PARTING, PartingSettings
 from afm_scan_ros.core.types import Array
 
 
-@frozen
+@frozen(slots=False)
 class Repetition:
     """Samples from ``first`` to before ``last`` in which a motion repeats ``periods`` times."""
 
@@ -68,16 +70,19 @@ class Repetition:
         )
 
     def without_first(self) -> "Repetition":
-        """Return that of all periods but the first."""
-        first = self.first + round(self.count / self.periods)
-        periods = self.periods * (self.last - first) / self.count
-        return evolve(self, first=first, periods=periods)
+        """Return that of the later periods, all but the first."""
+        period = self.count / self.periods
+        return self._within(self.first + round(period), self.last, period)
 
     def halved(self, count: int) -> "Repetition":
         """Return that of every other sample, of which there are ``count``."""
-        first, last = -(-self.first // 2), min(self.last // 2, count)
-        periods = self.periods * 2 * (last - first) / self.count
-        return evolve(self, first=first, last=last, periods=periods)
+        last = min(self.last // 2, count)
+        return self._within(-(-self.first // 2), last, 0.5 * self.count / self.periods)
+
+    def _within(self, first: int, last: int, period: float) -> "Repetition":
+        """Return that of a ``period`` in samples, of as many to ``last`` as transform fast."""
+        count = fast_length(last - first)
+        return evolve(self, first=first, last=first + count, periods=count / period)
 
     def refined(self, moved: Array) -> "Repetition":
         """Return the number of periods near this one that leaves least of a motion (n,) between."""
@@ -99,17 +104,21 @@ class Repetition:
         power = np.sum(self._changing(dct(seen, norm="ortho")) ** 2)
         return float(power / np.var(seen) / self.count)
 
-    @property
+    @cached_property
     def _period(self) -> tuple[int, int]:
-        """Samples of a period, and of all, at the rate nearest to a whole number of both.
+        """Samples of a period, and of all, at a rate with a whole number of both.
 
-        The rate is at least that of the record, so no coefficient is lost.
+        It is the first that misses them by less than the precision and transforms fast, or else the
+        one that misses least. It is at least that of the record, so no coefficient is lost.
         """
         least = max(math.ceil(self.count / self.periods), 1)
         tried = np.arange(least, max(int(self.settings.finer * least), least + 8) + 1)
-        misfit = np.abs(tried * self.periods - np.round(tried * self.periods)) / tried
-        samples = int(tried[int(misfit.argmin())])
-        return samples, max(round(samples * self.periods), self.count)
+        lengths = np.maximum(np.round(tried * self.periods).astype(int), self.count)
+        misfit = np.abs(tried * self.periods - lengths) / tried
+        fast = [next_fast_len(length) == length for length in lengths.tolist()]
+        both = fast & (misfit <= self.settings.precision)
+        place = both.argmax() if both.any() else misfit.argmin()
+        return int(tried[place]), int(lengths[place])
 
 
 def _slow_courses(signals: Array, samples: int, slow: int) -> Array:

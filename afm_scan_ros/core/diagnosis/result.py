@@ -156,8 +156,8 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
     selection = diagnosed.selection
     posterior, stated = selection.posterior, diagnosed.final is not diagnosed.chain
     own = posterior.likeliest if stated else ()
-    if stated and (diagnosed.untested or diagnosed.synchronous_places):
-        why = WhyNot.UNTESTED if diagnosed.untested else WhyNot.MODEL_ERROR
+    if stated and (diagnosed.like_own_error or diagnosed.synchronous_places):
+        why = WhyNot.UNTESTED if diagnosed.like_own_error else WhyNot.MODEL_ERROR
         yield Alternative(MODEL_ERROR, "", diagnosed.axis, 0.0, math.nan, why, own)
     credible = posterior.credible(CERTAIN)
     for names in [n for n in posterior.probability if n != own][:RUNNERS_UP]:

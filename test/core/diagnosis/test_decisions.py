@@ -4,6 +4,9 @@ The numbers are written out here, and each case lies on either side of one: a co
 doubled or halved fails a test.
 """
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from attrs import evolve, frozen
@@ -160,24 +163,50 @@ def test_half_an_error_may_lie_in_the_band_above() -> None:
     assert found[3] == pytest.approx(0.5 * found[2], rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("moved", "share", "informative"),
-    [(0.15, 0.06, True), (0.15, 0.15, False), (0.045, 0.06, True), (0.022, 0.06, False)],
-)
-def test_a_record_tells_the_error_of_bands_in_which_it_moved(
-    moved: float,
-    share: float,
-    informative: bool,  # noqa: FBT001 - a parameter
+def test_half_of_that_half_may_lie_in_the_next_band_up_to_the_resonance() -> None:
+    moved = np.where(np.arange(COUNT) == 2, 1e-6, 1e-12)
+    found = limit_of(2.0 * moved, Motion(moved, np.full(COUNT, 0.1)).known())
+    assert found[4 : VIBRATING + 1] == pytest.approx(
+        found[2] * 0.5 ** np.arange(2, VIBRATING - 1), rel=0.01
+    )
+    assert np.all(found[VIBRATING + 1 :] < 0.1 * found[VIBRATING])
+
+
+@pytest.mark.parametrize(("size", "share"), [(0.5, 0.01), (2.0, 0.04), (6.0, 0.07)])
+def test_a_share_is_that_of_the_nearest_amplitudes_of_records_that_moved(
+    size: float, share: float
 ) -> None:
-    """It moves in a band that holds 3 % of its motion and errs by less than a tenth there."""
-    band = 3
-    size = np.where(np.arange(COUNT) == 0, 1e-6, 1e-12)
-    size[band] = moved * 1e-6
-    other = Motion(size, np.where(np.arange(COUNT) == band, share, 0.01))
-    asked = 0.5 * size
-    alone = limit_of(asked, Motion(0.1 * size, 0.0 * FLAT).known())
-    both = limit_of(asked, Motion(0.1 * size, 0.0 * FLAT).known(), other.known())
-    assert bool(both[band] > 2.0 * alone[band] + 1e-12) == informative
+    """Between two records it lies as the logarithm of the amplitude, beyond them it stays."""
+    small, large = (Motion(k * FLAT, np.full(COUNT, s)) for k, s in ((1.0, 0.01), (4.0, 0.07)))
+    first = np.arange(COUNT) == 0
+    still = Motion(np.where(first, 5e-5, 1e-12), np.where(first, 0.01, 0.5))
+    found = limit_of(size * FLAT, small.known(), large.known(), still.known()) / (size * FLAT)
+    assert found[1:VIBRATING] == pytest.approx(np.full(VIBRATING - 1, share), rel=0.05)
+
+
+def test_where_no_record_moved_the_largest_share_counts() -> None:
+    moved = np.where(np.arange(COUNT) < 3, 1e-6, 1e-12)
+    share = np.where(np.arange(COUNT) == 1, 0.07, 0.01)
+    found = limit_of(3.0 * FLAT, Motion(moved, share).known()) / (3.0 * FLAT)
+    assert found[3:VIBRATING] == pytest.approx(np.full(VIBRATING - 3, 0.07), rel=0.05)
+
+
+def test_at_rest_in_a_band_the_least_error_of_any_record_scales_with_the_whole_motion() -> None:
+    moved = np.where(np.arange(COUNT) == 0, 1e-6, 1e-12)
+    known = [
+        evolve(Motion(size * moved, 0.0 * FLAT).known(), rms=np.full(COUNT, rms))
+        for size, rms in ((1.0, 3e-9), (4.0, 8e-9))
+    ]
+    found = limit_of(2.0 * moved, *known)[2:VIBRATING]
+    assert found == pytest.approx(np.full(VIBRATING - 2, 4e-9), rel=0.05)
+
+
+def test_what_a_model_states_beyond_its_parameters_adds_to_what_its_records_tell() -> None:
+    spread: Any = SimpleNamespace(bands=EDGES, shares=np.full(COUNT, 0.04))
+    known = [Motion(FLAT, np.full(COUNT, 0.03)).known()]
+    found = detection_limit(known, signal_of(3.0 * FLAT), PERIOD, RESONANCE, spread)
+    shares = found.rms[:VIBRATING] / (3.0 * FLAT[:VIBRATING])
+    assert shares == pytest.approx(np.full(VIBRATING, 0.05), rel=0.05)
 
 
 def test_bands_end_below_seven_tenths_of_half_the_sample_rate() -> None:

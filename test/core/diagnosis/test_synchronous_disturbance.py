@@ -56,6 +56,15 @@ def test_harmonics_of_a_synchronous_disturbance_are_synchronous(healthy: Scan) -
     assert diagnose(default_model(), [record]).verdict in (AMBIGUOUS, UNEXPLAINED)
 
 
+def test_an_asynchronous_one_is_certain_beside_an_error_that_no_record_tests(healthy: Scan) -> None:
+    model = default_model()
+    known = tuple(evolve(one, fitted=True) for one in model.x.model_discrepancies)
+    fitted = evolve(model, x=evolve(model.x, model_discrepancy=known[0], known_elsewhere=known[1:]))
+    found = diagnose(fitted, [scanned(healthy, OUT_OF_STEP)]).by_axis["x"]
+    assert found.untested
+    assert found.verdict == FOUND
+
+
 def rested(frequency: float, size: float, period: float = 1e-4) -> Record:
     """Of a scanner that its drive leaves alone."""
     noise = np.random.default_rng(2).normal(0.0, 2e-9, (2, STILL))
