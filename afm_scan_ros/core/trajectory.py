@@ -57,7 +57,7 @@ KEPT = 2
 
 
 def raster(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Displacement (m) at sample numbers from the first line's start, where x turns round."""
+    """Displacement (m) at sample numbers from the first line's start; x rests before and after."""
     number, way = line_and_way(spec, samples)
     return _line_x(spec)[way], stepped_y(spec, number, way)
 
