@@ -23,11 +23,10 @@ from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import SHARE, extended
 from afm_scan_ros.core.intersample import HELD, upsampling, voltages_of
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, BaseEffects, InverseSettings, ScannerModel
-from afm_scan_ros.core.prediction_error import standard_deviation
+from afm_scan_ros.core.prediction import SHARE, extended, standard_deviation
 from afm_scan_ros.core.scanner import predict
 from afm_scan_ros.core.types import AXES, Array, Trace, channels_of, trace_of
 from afm_scan_ros.files import model_file, share_directory, version, yaml

@@ -10,9 +10,9 @@ from afm_scan_ros.core.diagnosis.settings import (
     PosteriorSettings,
     StructureSettings,
 )
-from afm_scan_ros.core.extension import ExtensionSettings
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.intersample import IntersampleSettings
+from afm_scan_ros.core.prediction import ExtensionSettings
 from afm_scan_ros.drivers.safety import SafetySettings
 from afm_scan_ros.features.view.viewer import ViewSettings
 from afm_scan_ros.report.reduction import DrawingSettings

@@ -13,9 +13,8 @@ from afm_scan_ros.cli import options
 from afm_scan_ros.cli.progress import working
 from afm_scan_ros.core.diagnosis.experiments import LONGEST
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.metrics import plain
+from afm_scan_ros.core.metrics import plain, sensor_doubt
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.types import AXES
 from afm_scan_ros.files.paths import write_text
 from afm_scan_ros.model import load_model

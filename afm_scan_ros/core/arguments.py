@@ -1,14 +1,17 @@
-"""Checks of what a user gives, with errors that say what to give instead."""
+"""Checks of what a user gives, and of fits to it, with errors that say what to give instead."""
 
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Kind = TypeVar("Kind")
 
@@ -35,11 +38,7 @@ def all_of_type(kind: type[Kind], name: str, given: Iterable[Kind], fix: str) ->
 
 
 def samples(what: str, given: ArrayLike) -> Array:
-    """Return finite numbers of shape (n, channels), float64, each channel contiguous.
-
-    ``given`` has that shape, or (n,) for one channel; ``what`` names it in the InputError that is
-    raised for anything else.
-    """
+    """Return numbers (n,) or (n, channels) as the latter; an InputError names ``what`` is wrong."""
     try:
         array = np.asarray(given)
     except ValueError as error:
@@ -109,3 +108,14 @@ def refuse_other_count(what: str, values: Array, axes: Sequence[str]) -> None:
             f"{what} has {channels} channel{'s' * (channels > 1)}, but the axes are"
             f" {', '.join(axes)}: give shape (n, {len(axes)})"
         )
+
+
+def require_converged(found: "OptimizeResult", what: str) -> Array:
+    """Return what ``least_squares`` found; raises ScanError where it has not converged."""
+    if not found.success:
+        raise ScanError(
+            f"{what}: the fit has not converged after {found.nfev} evaluations: see that drive and"
+            " displacement of the record belong together, or record it longer"
+        )
+    parameters: Array = found.x
+    return parameters

@@ -15,21 +15,14 @@ from afm_scan_ros.core.types import Array
 
 
 def bounds(edges: ArrayLike, count: int, sample_period: float) -> tuple[int, ...]:
-    """First coefficients (n + 1,) of n bands between n + 1 edges (Hz), and where the last ends.
-
-    What lies on an edge, but for rounding, belongs to the band above; what lies outside all bands
-    to the nearest.
-    """
+    """First coefficient of each band between edges (Hz), and the end; an edge is in the upper."""
     inner, duration = np.asarray(edges, dtype=np.float64)[1:-1], 2.0 * count * sample_period
     first = np.ceil(inner * duration * (1.0 - 1e-12))
     return (0, *(int(k) for k in np.minimum(first, count)), count)
 
 
 def spread(per_band: Array, edges: ArrayLike, count: int, sample_period: float) -> Array:
-    """Values of n bands between n + 1 edges (Hz), for each of ``count`` coefficients; 0 at rest.
-
-    The first coefficient, the signal's mean, gets 0: displacement is relative.
-    """
+    """Values of n bands between edges (Hz), for each of ``count`` coefficients; the mean gets 0."""
     values = np.repeat(per_band, np.diff(bounds(edges, count, sample_period)))
     values[0] = 0.0
     return values

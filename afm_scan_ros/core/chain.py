@@ -30,10 +30,7 @@ from afm_scan_ros.core.model import (
 
 @frozen
 class Stage:
-    """Consecutive elements of a chain; two stages are equal where their elements are.
-
-    ``coupling`` is what the other axis adds before them.
-    """
+    """Consecutive elements of a chain, after the ``coupling`` that the other axis adds."""
 
     elements: tuple[ChainElement[AnyEffect], ...]
     coupling: tuple[Element[SampledCoupling], ...] = ()
@@ -53,10 +50,7 @@ RATE_INDEPENDENT: Element[AnyEffect] = Element(rate_independent)
 
 @frozen(eq=False)
 class Chain:
-    """The elements of one axis: the model's, and those that were put in beside them.
-
-    ``hysteresis`` lacks the first of its parameters, the operator of the model.
-    """
+    """Elements of one axis; ``hysteresis`` lacks its first parameter, the operator of the model."""
 
     model: AxisModel
     drive: tuple[ChainElement[AnyEffect], ...] = ()
@@ -83,25 +77,20 @@ class Chain:
     def multiplied(self, numerator: Iterable[float], denominator: Iterable[float]) -> "Chain":
         """Chain of which the vibration has other polynomials, by an effect that multiplies it.
 
-        It multiplies what the model lacks too, so the inverse keeps to the motion that its weight
-        was chosen for: a mode beyond the model would ring the more, the more the inverse passed
-        there.
+        It multiplies what the model lacks too. So the inverse keeps to the motion that its weight
+        was chosen for, and excites a mode beyond the model no more.
         """
         changed = self.with_vibration(numerator=numerator, denominator=denominator)
         return evolve(changed, before=self.before or self.model.vibration)
 
     def with_drive(self, element: ChainElement[AnyEffect]) -> "Chain":
-        """Chain with one more element between the amplifier's input and the hysteresis.
-
-        Its inverse gives as many samples as it takes: it does not look ahead.
-        """
+        """Chain with one more element before the hysteresis, whose inverse does not look ahead."""
         return evolve(self, drive=(element, *self.drive))
 
     def with_hysteresis(self, element: Element[AnyEffect]) -> "Chain":
         """Chain with another hysteresis in the place of the model's.
 
-        Raises InputError where it has been replaced already, for the first would be lost, and
-        where the model's is no Preisach operator, of whose plays the other one is made.
+        Raises InputError where it has been replaced already, or is no Preisach operator.
         """
         _ = self.model.hysteresis.surface
         if self.hysteresis != RATE_INDEPENDENT:

@@ -28,10 +28,7 @@ FAST_LINE_RATE = 20.0
 
 
 def validation_specs(spec: ScanSpec) -> dict[str, ScanSpec]:
-    """Return a scan, and the same scan with another rate, amplitude and pattern.
-
-    All have the same sample period.
-    """
+    """Return a scan, and that of another rate, amplitude and pattern, at one sample period."""
     return {
         FIRST: spec,
         "rate": _other_rate(spec),
@@ -71,10 +68,7 @@ class ScannerSession(Protocol):
     """A scanner that makes scans, and experiments that resolve an ambiguity."""
 
     def scan(self, label: str, spec: ScanSpec, model: ScannerModel) -> Scan:
-        """Scan with all of a model's inverses, and with the preview that they need.
-
-        Raises InputError or ScanError where the scan cannot be made.
-        """
+        """Scan with all of a model's inverses; raises InputError or ScanError where it cannot."""
         ...
 
     def experiment(self, plan: Plan) -> Record:
@@ -86,9 +80,8 @@ class ScannerSession(Protocol):
 class Round:
     """What the diagnosis found, and how the scans with the extended model compare.
 
-    ``model`` made the scans ``before``. ``experiments`` were recorded in this round; each later
-    round diagnoses them again. ``after`` and ``comparisons`` are empty where nothing new was found.
-    They are also empty where the extended inverse could not make a scan; ``refusal`` is the reason.
+    ``model`` made the scans ``before``; ``experiments`` were recorded in this round. ``after`` and
+    ``comparisons`` are empty where nothing new was found, or no scan could be made: ``refusal``.
     """
 
     model: ScannerModel
@@ -128,8 +121,7 @@ def close_loop(
 ) -> Iterator[Round]:
     """Yield rounds until one finds nothing more, makes nothing better, or is the last.
 
-    Each round diagnoses the residual of ``model`` on all records so far. These are the fitted
-    scan, made with each model in turn, and the experiments.
+    Each diagnoses ``model`` on the fitted scans of all models so far, and on the experiments.
     """
     believed, scans = model, _scans(session, model, comparisons, 0)
     fitted: list[Record] = []
@@ -155,10 +147,7 @@ def diagnose_until_resolved(
     experiments: dict[str, Record],
     diagnose: Diagnose,
 ) -> Iterator[ScannerDiagnosis]:
-    """Diagnose the residual; repeat with the proposed experiment while the verdict is open.
-
-    Adds the records of these experiments to ``experiments``.
-    """
+    """Diagnose; while the verdict is open, add the proposed experiment to ``experiments``."""
     yield (found := diagnose(model, [*fitted, *experiments.values()]))
     for _ in range(MOST_EXPERIMENTS):
         wanted = found.proposal

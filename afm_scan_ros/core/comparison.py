@@ -9,11 +9,11 @@ import numpy as np
 from attrs import evolve, field, frozen
 from scipy.optimize import least_squares
 
+from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.metrics import METRES, Figure, Scan, Tracking
 from afm_scan_ros.core.model import Added, ScannerModel
 from afm_scan_ros.core.scanner import predict
@@ -31,10 +31,7 @@ def residual_of(model: ScannerModel, scan: Scan, axis: str) -> Array:
 
 
 def with_own_parameters(model: ScannerModel, scan: Scan) -> ScannerModel:
-    """Return the model with the parameters that differ in every record fitted to a scan.
-
-    A model without such parameters is returned as it is.
-    """
+    """Return the model with the parameters that differ in every record fitted to a scan."""
     for axis in AXES:
         if places := _own(model, axis):
             model = _fitted(model, scan, axis, places)
@@ -82,7 +79,6 @@ class Residual:
     """Rms (m) of measured minus predicted displacement, mean removed, of a scan that no fit saw.
 
     ``before`` is of the model, ``after`` of its extension, and ``floor`` is the detection limit.
-    Only parameters that differ in every record, such as a disturbance's phase, are fitted to it.
     """
 
     floor: float = field(metadata=METRES)
@@ -92,10 +88,7 @@ class Residual:
 
 @frozen(eq=False)
 class ScanComparison:
-    """Tracking errors before and after, and the residuals of both models on the scan after.
-
-    The true errors are None where no noise-free displacement is known.
-    """
+    """Tracking errors, the true ones where known, and both models' residuals on the scan after."""
 
     measured_before: Tracking
     measured_after: Tracking

@@ -14,7 +14,7 @@ from afm_scan_ros.core.errors import SampleError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import SMALLEST_RANGE, ScanSpec
-from afm_scan_ros.core.scanner import Coupling, InverseState, compensator
+from afm_scan_ros.core.scanner import Coupling, InverseState, chain_of
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import AXES, Array, Trace
 
@@ -32,10 +32,7 @@ NOTHING: Array = np.empty(0)
 
 @frozen(eq=False)
 class Progress:
-    """State of the compensation: next drive sample, states of the inverses, last drives (V).
-
-    ``ahead`` holds samples that are computed for one axis but not yet for the other.
-    """
+    """States of the inverses, last drives (V), and samples that are ``ahead`` of the other axis."""
 
     next_sample: int
     output: Sequence[Any]
@@ -51,8 +48,7 @@ class Compensation:
     """Desired displacement (m) in, drive (V) out, some samples later; the state is passed in.
 
     ``invert`` and ``finish`` raise ScanError naming sample, axis and value where the drive would
-    leave the model's identified range or the amplifier's limits, and where an axis that the model
-    lacks is to move. The drive of such an axis is 0 V.
+    leave the identified range or the limits, and where an axis that the model lacks is to move.
     """
 
     def __init__(
@@ -66,7 +62,7 @@ class Compensation:
         chosen = frozenset(inverses)
         self._axes = model.axes
         self._effects = [
-            compensator(model.axis(name), sample_period, chosen, settings).effects
+            chain_of(model.axis(name)).compensator(sample_period, chosen, settings).effects
             for name in self._axes
         ]
         self._coupling = Coupling(model, sample_period, self._axes if chosen else ())
@@ -182,12 +178,8 @@ class Compensation:
 
     def whole(self, desired: Trace) -> Trace:
         """Return the drive of a whole scan from its first sample."""
-        whole = {name: np.empty(len(desired.x)) for name in AXES}
-        for drive in self._blocks(desired):
-            last = drive.first_sample + len(drive.x)
-            for name in AXES:
-                whole[name][drive.first_sample : last] = drive.axis(name)
-        return Trace(0, self._sample_period, whole["x"], whole["y"])
+        x, y = zip(*((drive.x, drive.y) for drive in self._blocks(desired)), strict=True)
+        return Trace(0, self._sample_period, np.concatenate(x), np.concatenate(y))
 
     def _blocks(self, desired: Trace) -> Iterator[Trace]:
         progress = self.at_rest()
@@ -223,12 +215,9 @@ Ranges = dict[str, float]
 def preflight(
     compensation: Compensation, spec: ScanSpec, samples: int, learned: Correction | None = None
 ) -> Generator[str, None, None]:
-    """Invert the first ``samples`` of a scan in pieces; yield before each what is being done.
+    """Invert the first ``samples`` of a scan, with what was ``learned``; yield what is being done.
 
-    ``learned`` is what changes its reference, if anything does.
-
-    Raises ScanError naming sample, axis and value where the drive leaves the model's identified
-    range or a limit.
+    Raises ScanError naming sample, axis and value where the drive leaves the range or a limit.
     """
     progress = compensation.at_rest()
     stop: Stop = None
@@ -246,10 +235,9 @@ def largest_ranges(
 ) -> Generator[str, None, Ranges]:
     """Largest ranges (m) up to those of ``spec`` with which the scan's drive can be had.
 
-    x is found first, with y at rest, and then y, so that both hold together; all else of the scan
-    stays. Each is bisected to ``RESOLUTION``, as a larger range needs a larger drive: at most 17
-    inversions of ``SEARCHED`` samples, and one or a few of all. Empty where no range will do, for
-    the preparation needs too much by itself. Yields what is being done, as ``preflight``.
+    x is found first, with y at rest, and then y, each bisected to ``RESOLUTION``: at most 17
+    inversions of ``SEARCHED`` samples, and one or a few of all. Empty where the preparation needs
+    too much by itself. Yields what is being done, as ``preflight``.
     """
     samples = min(samples, total_samples(spec))
     found = dict.fromkeys(AXES, SMALLEST_RANGE)

@@ -49,10 +49,7 @@ def _numba() -> ModuleType:
 
 
 class Compiled(Generic[P, R]):
-    """A loop that becomes machine code when it is first called.
-
-    Importing numba takes longer than many a command does, most of which call no loop.
-    """
+    """A loop that becomes machine code when it is first called, as importing numba takes long."""
 
     def __init__(
         self,
@@ -89,17 +86,10 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def regrouped(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a loop whose sums may be taken in any order, several at a time.
-
-    Its results differ by rounding from those in the order as written.
-    """
+    """Compile a loop whose sums may be taken in any order, which changes them by rounding."""
     return Compiled(function, regroups=("reassoc", "contract", "nsz"))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function as part of each loop that calls it.
-
-    For what runs every sample with arrays: a call of its own counts references to them, which
-    takes longer than a few sums.
-    """
+    """Compile a function as part of each loop that calls it, for what runs every sample."""
     return Compiled(function, "always")

@@ -18,8 +18,7 @@ Stop: TypeAlias = int | None
 class Correction:
     """Change of the reference of one scan, m: ``x`` and ``y`` of shape (total samples,).
 
-    It belongs to ``spec``. The scan's error is still measured against the desired displacement.
-    Raises InputError for another number of samples, and for what is not finite.
+    The scan's error is still measured against the desired displacement.
     """
 
     spec: ScanSpec
@@ -46,10 +45,7 @@ class Correction:
         return self.follow(None, desired(self.spec, 0, len(self.x)))[1]
 
     def follow(self, stop: Stop, block: Trace) -> tuple[Stop, Trace]:
-        """Return the state after a block of the desired displacement, and its reference.
-
-        Of a scan that is stopped the correction fades out as the trajectory does.
-        """
+        """Return the state after a desired block, and its reference; it fades out at a stop."""
         first, count = block.first_sample, len(block.x)
         if stop is None:
             stop = self._stop_in(block)

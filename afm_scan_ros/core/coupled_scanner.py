@@ -18,12 +18,7 @@ from afm_scan_ros.core.arguments import period_of, refuse_other_count, samples
 from afm_scan_ros.core.effects.effect_type import Actuators, FeedbackElement
 from afm_scan_ros.core.effects.registry import coupled_form
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.identification.state_space.feedback import (
-    FeedbackModel,
-    fixed_point,
-    output_of,
-    with_added,
-)
+from afm_scan_ros.core.identification.state_space import feedback
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.types import Array
@@ -60,9 +55,8 @@ def valued(names: Iterable[str], actuators: Actuators) -> tuple[FeedbackEffect, 
 
 @frozen
 class LevelError:
-    """Error of a simulation of records that the fit did not see, at one level of the drive.
+    """Rms error (m) on records that the fit did not see, at one rms of the drive (V), all channels.
 
-    ``drive_rms`` (V) and ``displacement_rms`` (m) are over all channels, as is ``error_rms`` (m).
     ``by_band`` is the error over the displacement in parts of equal width of the model's band.
     """
 
@@ -104,7 +98,7 @@ class CoupledScanner:
                 f"the model's scales have shapes {scales}, and its structure"
                 f" {len(self.linear.d)} outputs, which are not those of {count} axes"
             )
-        inputs = with_added(self.elements, still, still, 1).shape[1]
+        inputs = feedback.with_added(self.elements, still, still, 1).shape[1]
         if self.linear.d.shape[1] != inputs:
             raise InputError(
                 f"the structure has {self.linear.d.shape[1]} inputs, where axes and effects ask for"
@@ -117,9 +111,9 @@ class CoupledScanner:
         return elements_of(self.effects, self.actuators)
 
     @cached_property
-    def model(self) -> FeedbackModel:
+    def model(self) -> feedback.FeedbackModel:
         """The structure with its elements."""
-        return FeedbackModel(self.linear, self.elements, self.band)
+        return feedback.FeedbackModel(self.linear, self.elements, self.band)
 
     @property
     def sample_period(self) -> float:
@@ -146,8 +140,7 @@ class CoupledScanner:
     def predict(self, drive: Array, *, periodic: bool) -> Array:
         """Displacement (samples, p) of a drive (samples, m), from rest or as one whole period.
 
-        Raises InputError for a drive beyond the reach or the band, ScanError where the simulation
-        does not settle.
+        Raises InputError for a drive beyond reach or band, ScanError where it does not settle.
         """
         for sample, channel in np.argwhere(np.abs(drive) > self.reach)[:1]:
             raise InputError(
@@ -166,9 +159,8 @@ class CoupledScanner:
     def invert(self, desired: Array, *, periodic: bool) -> Array:
         """Drive (samples, m) of a displacement (samples, p), from rest or as one whole period.
 
-        Raises InputError for a displacement beyond the band, or which needs a drive before it
-        begins or after it ends, ScanError where the inverse does not settle or leaves more than
-        the model's error.
+        Raises InputError for one beyond the band, or not at rest at its ends, and ScanError where
+        the inverse does not settle or leaves more than the model's error.
         """
         self._refuse_out_of_band("desired", desired)
         run = len(desired)
@@ -186,11 +178,11 @@ class CoupledScanner:
 
         def missing(drive: Array) -> Array:
             """Drive that a drive lacks, were the outputs the desired ones."""
-            inputs = with_added(self.elements, drive, desired, run)
+            inputs = feedback.with_added(self.elements, drive, desired, run)
             inputs[:, : drive.shape[1]] = drive
-            return output_of(inverse, desired - output_of(response, inputs))
+            return feedback.output_of(inverse, desired - feedback.output_of(response, inputs))
 
-        return fixed_point(missing, output_of(inverse, desired), "inverse")
+        return feedback.fixed_point(missing, feedback.output_of(inverse, desired), "inverse")
 
     def _refuse_out_of_band(self, what: str, signal: Array) -> None:
         """Raise InputError where more of a signal than may be left out is above the band."""

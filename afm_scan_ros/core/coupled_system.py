@@ -32,10 +32,7 @@ System = tuple[Array, Array, Array, float, float]
 
 @frozen(eq=False)
 class SampledCoupling(SampledSystem):
-    """What the other axis o (m) adds, in m: a linear system of o, of share d, and an arc.
-
-    The arc has a ``curvature`` (1/m).
-    """
+    """What the other axis adds, in m: a linear system of it, and an arc of ``curvature`` (1/m)."""
 
     curvature: float = 0.0
 
@@ -67,21 +64,12 @@ def sum_of(parts: Iterable[SampledCoupling], sample_period: float) -> SampledCou
     return SampledCoupling(*linear, sample_period, curvature=sum(curvatures))
 
 
-@frozen(eq=False)
-class CoupledState:
-    """The next sample, and the coupling states of x and of y."""
-
-    next_sample: int
-    x: Array
-    y: Array
+CoupledState = tuple[int, Array, Array]
+"""The next sample, and the coupling states of x and of y."""
 
 
 class CoupledSystem:
-    """Both axes, each of which adds to the other.
-
-    Raises InputError where the inverse is unstable at rest: where 1 - Gx Gy of both couplings'
-    transfer functions has a zero on or outside the unit circle.
-    """
+    """Both axes, each of which adds to the other; InputError where the inverse is unstable."""
 
     def __init__(self, to_x: SampledCoupling, to_y: SampledCoupling, sample_period: float) -> None:
         self._to_x, self._to_y = to_x, to_y
@@ -89,34 +77,29 @@ class CoupledSystem:
 
     def at_rest(self) -> CoupledState:
         """State of axes that have long rested at zero."""
-        return CoupledState(0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b))
+        return 0, np.zeros_like(self._to_x.b), np.zeros_like(self._to_y.b)
 
     def solve(self, before: CoupledState, target: Trace) -> tuple[CoupledState, Trace]:
         """Return the own displacement (m) of each axis for a target (m) of both.
 
-        Raises ScanError naming the sample, counted from the first ever solved, where the two
-        equations have no solution that the motion reaches from rest.
+        Raises ScanError naming the sample where no solution can be reached from rest.
         """
-        states = before.x.copy(), before.y.copy()
+        first, states = before[0], (before[1].copy(), before[2].copy())
         own = np.empty_like(target.x), np.empty_like(target.y)
         systems = self._to_x.system, self._to_y.system
         solved = _solve(systems, states, (target.x, target.y), own)
         if solved < len(target.x):
             x, y = (1e6 * float(axis[solved]) for axis in (target.x, target.y))
             raise ScanError(
-                f"sample {before.next_sample + solved}: at x = {x:.6g} um, y = {y:.6g} um the"
+                f"sample {first + solved}: at x = {x:.6g} um, y = {y:.6g} um the"
                 " cross_coupling of both axes has no inverse: scan a smaller range, or remove"
                 " cross_coupling from one axis of the model"
             )
-        after = CoupledState(before.next_sample + solved, *states)
-        return after, Trace(target.first_sample, target.sample_period, *own)
+        return (first + solved, *states), Trace(target.first_sample, target.sample_period, *own)
 
 
 def _modes_of_inverse(to_x: SampledCoupling, to_y: SampledCoupling) -> NDArray[np.complex128]:
-    """Eigenvalues of both axes' coupling states, while the target is zero.
-
-    Raises InputError where the shares alone leave no inverse.
-    """
+    """Eigenvalues of the inverse at rest; InputError where the shares alone leave no inverse."""
     left = 1.0 - to_x.d * to_y.d
     if not left > 0.0:
         raise InputError(

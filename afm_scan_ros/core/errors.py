@@ -2,10 +2,9 @@
 
 
 class InputError(ValueError):
-    """Something given to the package is wrong: file, argument or data.
+    """Something given to the package is wrong: file, argument or data; the exit status is 2.
 
-    The message is one line that names the file or argument, the place in it and the fix; line ends
-    that a library or a file put into it become blanks. A command that meets it exits with status 2.
+    The message is one line that names the file or argument, the place in it and the fix.
     """
 
     def __init__(self, message: object = "") -> None:
@@ -13,18 +12,16 @@ class InputError(ValueError):
 
 
 class ScanError(RuntimeError):
-    """The work was done, but what was asked does not hold: a limit exceeded, a scan incomplete.
+    """The work was done, but what was asked does not hold; the exit status is 3.
 
     The message is one line that names the sample, axis and value where there is one.
-    A command that meets it exits with status 3.
     """
 
 
 class SampleError(ScanError):
-    """A sample of a block is beyond what an effect can do.
+    """A sample of a block is beyond what an effect can do: its index, and the ``problem``.
 
-    ``sample`` is its index in the block, ``problem`` states what is wrong and how to fix it. A
-    caller that knows the axis and the block's place in the scan names these instead.
+    A caller that knows the axis and the block's place in the scan names these instead.
     """
 
     def __init__(self, sample: int, problem: str) -> None:

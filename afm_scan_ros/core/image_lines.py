@@ -44,10 +44,9 @@ def most_pixels(spec: ScanSpec) -> int:
 
 
 def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
-    """Return what a scan images of its lines, all but the overscan at each end.
+    """Return what a scan images of its lines from ``left`` (m) on, all but the overscan.
 
-    ``left`` is the line's lowest x in m, ``-range_x / 2`` by default. Raises InputError for a
-    pattern without lines, and for more pixels than a trace has samples.
+    Raises InputError for a pattern without lines, and for more pixels than a trace has samples.
     """
     if spec.pattern not in TO_AND_FRO:
         raise InputError(
@@ -66,8 +65,7 @@ def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
 def pixel_means(position: Array, values: Array, frame: Frame) -> Array:
     """Mean over each pixel of values at rising positions (m), straight between them.
 
-    A pixel at the end that the positions cover only in part has the mean over that part; one that
-    they do not reach, in a scan that was stopped, is NaN.
+    Of a pixel that they cover in part, over that part; NaN where they do not reach it.
     """
     edges = np.clip(frame.edges, position[0], position[-1])
     corners = np.union1d(position, edges)
@@ -90,10 +88,7 @@ class ImageLine:
 
 @define
 class LineImager:
-    """Gathers values along the lines block by block, and gives up each line once it is whole.
-
-    Keeps no more than one line.
-    """
+    """Gathers values along the lines block by block, and gives up each line once it is whole."""
 
     spec: ScanSpec
     frame: Frame
@@ -130,10 +125,7 @@ class Imaged(Protocol):
 
 
 class ImageLines:
-    """Reads a sample's height at the achieved position and places it at the desired one.
-
-    The tip touches the sample on the lines alone.
-    """
+    """Reads heights on the lines at the achieved position, and places them at the desired."""
 
     def __init__(self, spec: ScanSpec, frame: Frame, sample: Imaged) -> None:
         self._sample = sample

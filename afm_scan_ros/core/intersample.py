@@ -20,8 +20,7 @@ from scipy.fft import next_fast_len
 
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.settings import setting
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.types import Array, Trace, setting
 
 HELD, BAND_LIMITED = "held", "band_limited"
 INTERSAMPLE = (HELD, BAND_LIMITED)
@@ -50,10 +49,7 @@ INTERPOLATION = IntersampleSettings()
 
 
 def upsampling(intersample: str) -> int:
-    """Held voltages for each sample of a drive of an intersample behaviour.
-
-    Raises InputError for an unknown one.
-    """
+    """Held voltages for each sample of a drive; raises InputError for an unknown behaviour."""
     if intersample not in INTERSAMPLE:
         known = ", ".join(INTERSAMPLE)
         raise InputError(f"intersample {intersample!r} is unknown: give one of {known}")
@@ -81,10 +77,7 @@ def read_between(displacement: Array, intersample: str) -> Array:
 def moved_by(
     forward: Callable[[float], Cascade], drive: Array, sample_period: float, intersample: str
 ) -> Array:
-    """Output (n,) of a model at each sample of a drive (n,), from rest at zero.
-
-    ``forward`` makes the model at a sample period (s).
-    """
+    """Output (n,) at each sample of a drive (n,), from rest, of what ``forward`` makes."""
     every = upsampling(intersample)
     cascade = forward(sample_period / every)
     return cascade.apply(cascade.at_rest(), held_voltages(drive, intersample))[1][::every]
@@ -93,8 +86,7 @@ def moved_by(
 def _interpolated(signal: Array, gain: Callable[[Array], Array]) -> Array:
     """Upsample a signal (n,), with a gain at each angular frequency in rad per upsampled sample.
 
-    Beyond either end the signal goes on as its odd reflection in the end, which keeps value and
-    slope; half a cosine joins both reflections.
+    Beyond either end it goes on as its odd reflection; half a cosine joins both reflections.
     """
     count, every = len(signal), INTERPOLATION.upsampling
     reflected = np.pad(signal, count - 1, mode="reflect", reflect_type="odd")

@@ -27,11 +27,7 @@ class DriveLimits:
     slew: float = field(validator=_above_zero)
 
     def refuse_beyond(self, drive: Trace, before: dict[str, float]) -> None:
-        """Raise ScanError for the first sample of an axis beyond the voltage or the slew limit.
-
-        ``before`` is the drive (V) of each axis one sample period before the block. NaN is
-        refused.
-        """
+        """Raise ScanError for the first sample beyond the voltage or the slew limit, or NaN."""
         limits = drive.sample_period, self.voltage, self.slew
         if _both_keep_to(drive.x, drive.y, before["x"], before["y"], limits):
             return
@@ -52,10 +48,7 @@ class DriveLimits:
 
 
 def refuse_step(drive: Trace, before: Mapping[str, float], largest: float) -> None:
-    """Raise ScanError for the first sample that is over ``largest`` (V) from the one before it.
-
-    ``before`` is the drive (V) of each axis one sample period before the block.
-    """
+    """Raise ScanError for the first sample over ``largest`` (V) from the one before it."""
     for axis in AXES:
         steps = np.abs(np.diff(drive.axis(axis), prepend=before[axis]))
         beyond = np.flatnonzero(~(steps <= largest))
@@ -106,10 +99,7 @@ class AmplifierSpec:
 def ramp_to_rest(
     first_sample: int, sample_period: float, before: Mapping[str, float], slew: float
 ) -> Trace:
-    """Drive (V) from ``before`` to rest at zero, as half a cosine period.
-
-    Its steepest slope is ``slew`` (V/s), and both axes arrive together on its last sample.
-    """
+    """Drive (V) from ``before`` to rest at zero, as half a cosine of a largest ``slew`` (V/s)."""
     start = np.array([before[axis] for axis in AXES])
     duration = 0.5 * np.pi * np.max(np.abs(start)) / slew
     count = max(1, int(np.ceil(duration / sample_period)))

@@ -17,7 +17,7 @@ from attrs import AttrsInstance, define, field, fields, frozen, has
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.scan_spec import ScanSpec
+from afm_scan_ros.core.scan_spec import LARGEST_RANGE, ScanSpec
 from afm_scan_ros.core.streams import WholeLines
 from afm_scan_ros.core.trajectory import TO_AND_FRO, phases, sample_kinds
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -27,10 +27,7 @@ METRES = {"unit": "m"}
 
 @frozen
 class Figure:
-    """An error over a set of samples: rms and largest, in m and as a share of the range.
-
-    The range is that of the axis in the specification, however much of the scan is there.
-    """
+    """An error over a set of samples: rms and largest, in m and as a share of the planned range."""
 
     rms: float = field(metadata=METRES)
     largest: float = field(metadata=METRES)
@@ -133,8 +130,7 @@ class LineMeter:
 
     spec: ScanSpec
     mismatch: ErrorSum = field(factory=ErrorSum)
-    _jitter_x: ErrorSum = field(factory=ErrorSum)
-    _jitter_y: ErrorSum = field(factory=ErrorSum)
+    _jitter: list[ErrorSum] = field(factory=lambda: [ErrorSum() for _ in AXES])
     _whole: WholeLines = field(init=False)
     _trace: slice = field(init=False)
     _before: Array | None = None
@@ -153,10 +149,7 @@ class LineMeter:
 
     def repeatability(self) -> tuple[float | None, float | None]:
         """Return the rms change (m) from line to line in x and y; None before the third line."""
-        x, y = (
-            total.rms() / sqrt(2.0) if total.count else None
-            for total in (self._jitter_x, self._jitter_y)
-        )
+        x, y = (total.rms() / sqrt(2.0) if total.count else None for total in self._jitter)
         return x, y
 
     def _compare(self, number: int, line: Array) -> None:
@@ -170,17 +163,13 @@ class LineMeter:
         if self._before is not None:
             change = errors - self._before
             change -= change.mean(axis=1, keepdims=True)
-            self._jitter_x = self._jitter_x.plus(change[0])
-            self._jitter_y = self._jitter_y.plus(change[1])
+            self._jitter = [s.plus(row) for s, row in zip(self._jitter, change, strict=True)]
         self._before = errors.copy()
 
 
 @define
 class TrackingMeter:
-    """Compares the achieved with the desired displacement; ``tracking`` gives the figures so far.
-
-    ``displacement`` names what is compared: ``measured`` or ``true``.
-    """
+    """Compares the achieved with the desired displacement; ``tracking`` has the figures so far."""
 
     spec: ScanSpec
     displacement: str = "measured"
@@ -209,20 +198,17 @@ class TrackingMeter:
 
     def tracking(self) -> Tracking:
         """Return the figures of all samples so far."""
+        where = phases(self.spec).lines
+        inside = min(max(self._samples, where.start), where.stop) - where.start
         each_x, each_y = self._lines.repeatability()
         return Tracking(
             displacement=self.displacement,
             samples=self._samples,
-            lines=self._whole_lines(),
+            lines=inside // self.spec.samples_per_line,
             x=self._axis("x", each_x),
             y=self._axis("y", each_y),
             mismatch=self._lines.mismatch.figure(self.spec.range_x),
         )
-
-    def _whole_lines(self) -> int:
-        where = phases(self.spec).lines
-        inside = min(max(self._samples, where.start), where.stop) - where.start
-        return inside // self.spec.samples_per_line
 
     def _extend_range(self, axis: str, desired: Trace) -> None:
         where = phases(self.spec).lines
@@ -290,3 +276,15 @@ class Scan:
         meter = TrackingMeter(self.spec, displacement)
         meter.add(self.desired, self.true if displacement == "true" else self.measured)
         return meter.tracking()
+
+
+def sensor_doubt(axis: str, moved: float, lowest: float, highest: float) -> str:
+    """Return a sentence where an axis that is ``moved`` stands still, or goes too far (m)."""
+    if moved > 0.0 and lowest == highest:
+        return f"{axis}: the achieved displacement is constant: see that the sensor is connected"
+    if highest - lowest > LARGEST_RANGE:
+        return (
+            f"{axis}: the achieved displacement spans {highest - lowest:.3g} m, a scanner's"
+            f" {LARGEST_RANGE:g} m at most: see to the sensor's scale"
+        )
+    return ""

@@ -29,7 +29,7 @@ from afm_scan_ros.core.effects.sensor import SensorModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.spread import Spread
-from afm_scan_ros.core.types import AXES, floats
+from afm_scan_ros.core.types import AXES, floats, pair
 
 __all__ = [
     "INVERSES",
@@ -87,23 +87,17 @@ def closed(name: str, interval: Range, unit: str) -> ParameterInterval:
     return ParameterInterval(name, unit, lower, upper)
 
 
-def _range(given: Range | None) -> Range | None:
-    return None if given is None else (float(given[0]), float(given[1]))
-
-
 @frozen
 class EffectStatus:
     """How one effect is known, and over which drive (V), frequencies (Hz) and hold times (s).
 
-    A range that is None is not stated. ``identifiable_from`` is the kind of record that would
-    identify an effect that is unknown. Raises InputError for a range whose ends are exchanged, and
-    for an unknown effect without such a record.
+    ``identifiable_from`` is the kind of record that would identify an effect that is unknown.
     """
 
     status: Status = field(default=Status.IDENTIFIED, converter=Status)
-    drive: Range | None = field(default=None, converter=_range)
-    frequencies: Range | None = field(default=None, converter=_range)
-    hold_times: Range | None = field(default=None, converter=_range)
+    drive: Range | None = field(default=None, converter=optional_converter(pair))
+    frequencies: Range | None = field(default=None, converter=optional_converter(pair))
+    hold_times: Range | None = field(default=None, converter=optional_converter(pair))
     intervals: tuple[ParameterInterval, ...] = ()
     identifiable_from: str = ""
 
@@ -152,13 +146,11 @@ those around it.
 
 @frozen
 class ModelDiscrepancy:
-    """Rms in m of measured minus predicted displacement in each band, on held-out data.
+    """Rms (m) of measured minus predicted displacement in each band, on held-out data.
 
-    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` (n,) is free of the sensor's ``noise``
-    (n,). ``displacement`` (n,) is what the record itself holds in each band: ``rms`` over it is
-    the relative error, by which other drives may be judged. ``record`` describes the drive.
-    Of motion that was ``fitted`` they are the error of similar motion, and no more.
-    Raises InputError where they do not pair or are no rms.
+    ``bands`` are the n + 1 edges of n bands, Hz. ``rms`` is free of the sensor's ``noise``. Over
+    the ``displacement`` in each band it is the relative error, by which other drives may be judged.
+    Of motion that was ``fitted`` it is the error of similar motion. ``record`` is the drive.
     """
 
     record: str
@@ -183,10 +175,9 @@ class ModelDiscrepancy:
 
 
 def band_edges(sample_period: float, resonance: float) -> tuple[float, ...]:
-    """Edges in Hz of the bands of a signal sampled so often, a factor of 1.4 to 3 apart.
+    """Edges (Hz) of a signal's bands, a factor of 1.4 to 3 apart, up to the Nyquist frequency.
 
-    ``resonance`` (Hz) is the first of the model. The last edge is the Nyquist frequency; the others
-    have three digits.
+    ``resonance`` (Hz) is the first of the model.
     """
     nyquist, edges = 0.5 / sample_period, (edge_at(edge, resonance) for edge in EDGES)
     return (*(edge for edge in edges if edge < NARROWEST * nyquist), nyquist)
@@ -239,10 +230,7 @@ class HysteresisModel:
 
 @frozen
 class Added:
-    """An effect of the catalogue that was found on an axis, with the values of its parameters.
-
-    ``name`` and ``kind`` are the catalogue's; ``values``, in SI units, are in its order.
-    """
+    """An effect of the catalogue on an axis, with its parameters' values (SI) in their order."""
 
     name: str
     kind: str
@@ -251,10 +239,7 @@ class Added:
 
 @frozen
 class AxisModel:
-    """One axis: drive u (V) → hysteresis → F (V) → vibration → creep → displacement (m).
-
-    ``added`` are effects beyond the paper's, in the order in which they were found.
-    """
+    """One axis: drive u (V) → hysteresis → F (V) → vibration → creep → what was ``added`` → m."""
 
     hysteresis: HysteresisModel
     vibration: VibrationModel
@@ -300,10 +285,7 @@ class AxisModel:
 
 @frozen
 class ScannerModel:
-    """One axis or both, independent of each other but for what was added to either.
-
-    Raises InputError where there is none.
-    """
+    """One axis or both, independent of each other but for what was added to either."""
 
     x: AxisModel | None = None
     y: AxisModel | None = None

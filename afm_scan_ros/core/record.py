@@ -7,14 +7,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import ArrayLike
 
-from afm_scan_ros.core.arguments import (
-    SPEC,
-    axes_of,
-    of_type,
-    period_of,
-    refuse_other_count,
-    samples,
-)
+from afm_scan_ros.core import arguments
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import KINDS
 from afm_scan_ros.core.intersample import HELD, upsampling
@@ -28,11 +21,11 @@ STARTS = ("unknown", "depolarised")
 
 
 def _drive(given: ArrayLike) -> Array:
-    return samples("drive", given)
+    return arguments.samples("drive", given)
 
 
 def _displacement(given: ArrayLike) -> Array:
-    return samples("displacement", given)
+    return arguments.samples("displacement", given)
 
 
 def _shape(values: Array) -> str:
@@ -100,8 +93,8 @@ class Record:
 
     drive: Array = field(converter=_drive, repr=_shape, eq=by_value)
     displacement: Array = field(converter=_displacement, repr=_shape, eq=by_value)
-    sample_period: float = field(converter=period_of)
-    axes: tuple[str, ...] = field(default=("x",), converter=axes_of)
+    sample_period: float = field(converter=arguments.period_of)
+    axes: tuple[str, ...] = field(default=("x",), converter=arguments.axes_of)
     kind: str | None = None
     start: str = "unknown"
     intersample: str = field(default=HELD, kw_only=True)
@@ -111,7 +104,7 @@ class Record:
     info: ScanInfo | None = field(default=None, kw_only=True, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        refuse_other_count("displacement", self.displacement, self.axes)
+        arguments.refuse_other_count("displacement", self.displacement, self.axes)
         if len(self.drive) != len(self.displacement):
             raise InputError(
                 f"drive has {len(self.drive)} samples and displacement {len(self.displacement)}:"
@@ -123,7 +116,7 @@ class Record:
             raise InputError(f"start {self.start!r} is unknown: give one of {', '.join(STARTS)}")
         upsampling(self.intersample)
         if self.scan is not None:
-            of_type(ScanSpec, "scan", self.scan, SPEC)
+            arguments.of_type(ScanSpec, "scan", self.scan, arguments.SPEC)
 
     @classmethod
     def of_traces(
@@ -137,10 +130,7 @@ class Record:
         kind: str | None = None,
         start: str = "unknown",
     ) -> "Record":
-        """Return the record of a run of drive (V) and displacement (m), of some of its axes.
-
-        Raises InputError where the two are not sampled at one period.
-        """
+        """Return the record of a run of drive (V) and displacement (m) at one sample period."""
         period = drive.sample_period
         if displacement.sample_period != period:
             raise InputError(
@@ -161,16 +151,12 @@ class Record:
             raise InputError(
                 f"{self.name or 'record'}: has no axis {name}: give one of {', '.join(self.axes)}"
             )
-        refuse_other_count("drive", self.drive, self.axes)
+        arguments.refuse_other_count("drive", self.drive, self.axes)
         drive, displacement = self.signals(name)
         return evolve(self, drive=drive, displacement=displacement, axes=(name,))
 
     def part(self, first: int, last: int) -> "Record":
-        """Return the samples from ``first`` to before ``last``, which are of no whole scan.
-
-        Only a part that begins with the record begins in a state that is known. Raises InputError
-        where the record does not hold all of these samples, or there are none.
-        """
+        """Return the samples from ``first`` to before ``last``; InputError where it lacks any."""
         if not 0 <= first < last <= len(self.drive):
             raise InputError(
                 f"{self.name or 'record'}: has no samples from {first} to before {last}: it holds"
@@ -203,16 +189,13 @@ class Record:
             LOG.warning("%s", shortcoming)
 
     def traces(self) -> tuple[Trace, Trace]:
-        """Return drive (V) and displacement (m) of both axes; an absent axis is zero.
-
-        Raises InputError for other axes than x and y.
-        """
+        """Return drive (V) and displacement (m) of x and y, 0 if absent; InputError for others."""
         if not set(self.axes) <= set(AXES):
             raise InputError(
                 f"{self.name or 'record'}: its axes are {', '.join(self.axes)}: name them x and y,"
                 " unless the scanner has coupled axes"
             )
-        refuse_other_count("drive", self.drive, self.axes)
+        arguments.refuse_other_count("drive", self.drive, self.axes)
         drive, displacement = (
             trace_of(values, self.axes, self.sample_period)
             for values in (self.drive, self.displacement)

@@ -23,10 +23,7 @@ LATENCY = 0.04
 
 
 class OnlineCorrection(ABC):
-    """Corrects the reference of a scan, while it runs, by what was achieved of it so far.
-
-    What it yields depends on no timing. ``remark`` says in words what it can do in this scan.
-    """
+    """Corrects the reference of a scan by what was achieved; ``remark`` says what it can do."""
 
     remark = ""
 
@@ -39,7 +36,6 @@ class OnlineCorrection(ABC):
     def observe(self, name: str, block: Trace) -> None:
         """Take the next block of a topic, that of a drive before what was achieved under it.
 
-        The topics are those of desired displacement (m), drive (V) and achieved displacement (m).
         Raises ScanError where nothing can be learned from the block.
         """
 
@@ -78,10 +74,9 @@ class InversionSettings:
 class ScanInversion:
     """Takes the blocks of one scan, desired and achieved displacement (m); yields the drive (V).
 
-    The drive depends on how the desired displacement is cut into blocks by no more than rounding,
-    and on no timing. ``learned`` is what changes the scan's reference, if anything does. ``driven``
-    is the first sample whose drive is still to come. Raises InputError for a scan that cannot be
-    corrected as the ``settings`` ask.
+    The drive depends on no timing. ``learned`` changes the scan's reference, if anything does.
+    ``driven`` is the first sample whose drive is still to come. Raises InputError for a scan that
+    cannot be corrected as the ``settings`` ask.
     """
 
     def __init__(
@@ -120,10 +115,7 @@ class ScanInversion:
         return min((line for line in waiting if line is not None), default=None)
 
     def largest_step(self, samples: int) -> float:
-        """Return the largest change of the drive (V) from a sample to the next, of the first ones.
-
-        Raises ScanError where it cannot be driven; the inversion is used up.
-        """
+        """Return the drive's largest step (V) in the first samples; the inversion is used up."""
         largest, before = 0.0, np.zeros((2, 1))
         for first in range(0, samples, MAX_BLOCK):
             for drive in self.desired(
@@ -137,8 +129,7 @@ class ScanInversion:
     def preflight(self, samples: int) -> Generator[str, None, None]:
         """Invert the first ``samples`` of the scan at rest; yield before each piece what it is.
 
-        Raises ScanError naming sample, axis and value where it cannot be driven, and the largest
-        range with which it can.
+        Raises ScanError where it cannot be driven, with the largest range with which it can.
         """
         if self._learned is not None:
             yield from preflight(self._compensation, self._spec, samples, self._learned)
@@ -150,10 +141,7 @@ class ScanInversion:
             raise ScanError(f"{error}; {_advice(found)}") from error
 
     def desired(self, block: Trace, *, last: bool) -> Iterator[Trace]:
-        """Take the next block of the desired displacement, the ``last`` or not; yield the drive.
-
-        Raises ScanError where it leaves the model's identified range or a limit.
-        """
+        """Take the next desired block, the ``last`` or not; yield the drive, or raise ScanError."""
         self._end = end(block) if last else None
         reference = block
         if self._learned is not None:
@@ -161,10 +149,7 @@ class ScanInversion:
         yield from self._driven(DESIRED, block, [reference])
 
     def achieved(self, block: Trace) -> Iterator[Trace]:
-        """Take the next block of the achieved displacement; yield the drive that waited for it.
-
-        Raises ScanError as ``desired`` does.
-        """
+        """Take the next achieved block; yield the drive that waited for it, as ``desired``."""
         yield from self._driven(ACHIEVED, block, [])
 
     def is_last(self, drive: Trace) -> bool:

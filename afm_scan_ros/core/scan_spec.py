@@ -22,7 +22,8 @@ FASTEST = 1e7
 LONGEST = 1e12
 """Samples in a scan, four months of it at 100 kHz."""
 UNITS = {"": "", "_um": "m", "_hz": "Hz", "_ms": "s", "_s": "s"}
-"""SI units of parameters, by the suffixes of their names for people."""
+SCALES = {"_um": 1e-6, "_ms": 1e-3}
+"""SI units of parameters, by the suffixes of their names for people, and sizes other than 1."""
 
 
 def parameter(
@@ -30,10 +31,9 @@ def parameter(
     help: str,  # noqa: A002 - the word that every reader knows
     *checks: Callable[..., Any],
     suffix: str = "",
-    scale: float = 1.0,
 ) -> Any:  # noqa: ANN401 - attrs types the field by its annotation
-    """Declare one scan parameter: SI inside, ``name + suffix`` times ``scale`` for people."""
-    metadata = {"help": help, "suffix": suffix, "scale": scale, "checks": checks}
+    """Declare one scan parameter: SI inside, ``name + suffix`` in its unit for people."""
+    metadata = {"help": help, "suffix": suffix, "scale": SCALES.get(suffix, 1.0), "checks": checks}
     return field(default=default, validator=_refuse_other, metadata=metadata)
 
 
@@ -72,23 +72,13 @@ def _allowed(attribute: "Attribute[Any]") -> str:
 
 @frozen
 class ScanSpec:
-    """A scan, in SI units: m, Hz, s.
-
-    Raises InputError where a parameter is out of range or of another type, and where parameters
-    contradict.
-    """
+    """A scan, in SI units: m, Hz, s; InputError for parameters out of range, or that contradict."""
 
     pattern: str = parameter("raster", "Path of the scan", in_(PATTERNS))
     range_x: float = parameter(
-        40e-6,
-        "Peak-to-peak motion in x, turn-arounds included",
-        *PLAUSIBLE,
-        suffix="_um",
-        scale=1e-6,
+        40e-6, "Peak-to-peak motion in x, turn-arounds included", *PLAUSIBLE, suffix="_um"
     )
-    range_y: float = parameter(
-        40e-6, "Peak-to-peak motion in y", *PLAUSIBLE, suffix="_um", scale=1e-6
-    )
+    range_y: float = parameter(40e-6, "Peak-to-peak motion in y", *PLAUSIBLE, suffix="_um")
     line_rate: float = parameter(
         5.0, "To-and-fro lines (turns of a spiral) a second", gt(0.0), suffix="_hz"
     )
@@ -102,17 +92,15 @@ class ScanSpec:
     overscan: float = parameter(
         0.0, "Share of the range at each end that is scanned but not imaged", ge(0.0), lt(0.5)
     )
-    y_step: float = parameter(
-        2e-3, "Duration of the smooth y step", gt(0.0), suffix="_ms", scale=1e-3
-    )
+    y_step: float = parameter(2e-3, "Duration of the smooth y step", gt(0.0), suffix="_ms")
     preparation: str = parameter(
         "depolarise", "How the scanner's memory is set before the scan", in_(PREPARATIONS)
     )
     preparation_lower: float = parameter(
-        -28e-6, "Lowest displacement of the preparation", suffix="_um", scale=1e-6
+        -28e-6, "Lowest displacement of the preparation", suffix="_um"
     )
     preparation_upper: float = parameter(
-        25e-6, "Highest displacement of the preparation", suffix="_um", scale=1e-6
+        25e-6, "Highest displacement of the preparation", suffix="_um"
     )
     preparation_rate: float = parameter(
         10.0, "Oscillations of the preparation a second", gt(0.0), suffix="_hz"

@@ -3,12 +3,12 @@
 The displacements of coupled axes are x = x_own + Cx(y_own),    y = y_own + Cy(x_own)
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.coupled_system import CoupledSystem, sum_of
@@ -17,17 +17,13 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.effects.sensor import led
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.intersample import HELD
-from afm_scan_ros.core.model import AxisModel, InverseSettings, ScannerModel
+from afm_scan_ros.core.model import AxisModel, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.types import AXES, Array, Trace
 
 
 def chain_of(axis: AxisModel) -> Chain:
-    """Return the chain of one axis.
-
-    Raises InputError for an effect that the catalogue lacks, or that cannot stand beside those
-    before it, named by its place.
-    """
+    """Return the chain of one axis; raises InputError at the effect that cannot stand in it."""
     chain = Chain(axis)
     for place, added in enumerate(axis.added):
         try:
@@ -43,23 +39,13 @@ def forward(axis: AxisModel, sample_period: float) -> Cascade:
     return chain_of(axis).forward(sample_period)
 
 
-def compensator(
-    axis: AxisModel, sample_period: float, inverses: Iterable[str], settings: InverseSettings
-) -> Cascade:
-    """Return the cascade whose inverse compensates the effects named; see ``Chain``."""
-    return chain_of(axis).compensator(sample_period, inverses, settings)
-
-
 States = dict[str, Array]
 InverseState = Any
 """``States`` where one axis adds to the other, ``CoupledState`` where both do."""
 
 
 class Coupling:
-    """Coupling of both axes; the state is that of what is added to each.
-
-    ``axes`` are those to which the other adds something that counts.
-    """
+    """Coupling of both axes, or of those given; the state is that of what is added to each."""
 
     def __init__(
         self, model: ScannerModel, sample_period: float, axes: Collection[str] = AXES
@@ -95,10 +81,7 @@ class Coupling:
         return self._coupled.at_rest() if self._coupled else self.at_rest()
 
     def invert(self, state: InverseState, target: Trace) -> tuple[InverseState, Trace]:
-        """Own displacement of each axis (m) for a target (m) of both.
-
-        Raises InputError where the inverse is unstable, ScanError where a sample has none.
-        """
+        """Own displacement (m) of each axis for a target (m) of both; InputError where unstable."""
         if self._none:
             return state, target
         if self._coupled:
@@ -115,20 +98,12 @@ class Coupling:
         return {"x": x_after, "y": y_after}, (to_x, to_y)
 
 
-@frozen(eq=False)
-class Predicted:
-    """How far a prediction has come: the states of both axes, of their coupling, and behind it."""
-
-    own: dict[str, Any]
-    coupling: States
-    output: dict[str, Any]
+Predicted = tuple[dict[str, Any], States, dict[str, Any]]
+"""How far a prediction has come: the states of both axes, of their coupling, and behind it."""
 
 
 class Prediction:
-    """Drive (V) in, displacement (m) out, block by block; the state is passed in.
-
-    An axis that the model lacks rests at zero.
-    """
+    """Drive (V) in, displacement (m) out, by blocks; an axis that the model lacks rests at zero."""
 
     def __init__(self, model: ScannerModel, sample_period: float) -> None:
         chains = {name: chain_of(model.axis(name)) for name in model.axes}
@@ -142,17 +117,14 @@ class Prediction:
             {name: cascade.at_rest() for name, cascade in cascades.items()}
             for cascades in (self._own, self._output)
         )
-        return Predicted(own, self._coupling.at_rest(), output)
+        return own, self._coupling.at_rest(), output
 
     def advance(self, before: Predicted, drive: Trace) -> tuple[Predicted, Trace]:
-        """Return the state after a block, and the displacement during it.
-
-        Raises BeyondRangeError where the drive leaves the identified range.
-        """
-        own, alone = _applied(self._own, before.own, drive)
-        coupling, both = self._coupling.apply(before.coupling, alone)
-        output, displacement = _applied(self._output, before.output, both)
-        return Predicted(own, coupling, output), displacement
+        """Return state and displacement after a block; BeyondRangeError beyond the range."""
+        own, alone = _applied(self._own, before[0], drive)
+        coupling, both = self._coupling.apply(before[1], alone)
+        output, displacement = _applied(self._output, before[2], both)
+        return (own, coupling, output), displacement
 
 
 def _applied(
@@ -166,11 +138,7 @@ def _applied(
 
 
 def synchronised(model: ScannerModel, record: Record) -> Record:
-    """Return a record as one of a displacement that is read just before the drive's updates.
-
-    It was read as those were that the model was identified from. A drive that is not held has no
-    updates.
-    """
+    """Return a record with a held drive as if it were read just before the drive's updates."""
     if record.intersample != HELD:
         return record
     drive = record.drive.copy()
@@ -181,9 +149,6 @@ def synchronised(model: ScannerModel, record: Record) -> Record:
 
 
 def predict(model: ScannerModel, drive: Trace) -> Trace:
-    """Displacement (m) of a whole record from its drive (V), from depolarised rest at zero.
-
-    Raises BeyondRangeError where the drive leaves the identified range.
-    """
+    """Displacement (m) for a drive (V) from rest; BeyondRangeError beyond the identified range."""
     prediction = Prediction(model, drive.sample_period)
     return prediction.advance(prediction.at_rest(), drive)[1]

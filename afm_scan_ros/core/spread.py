@@ -40,11 +40,8 @@ class Variant:
 class Spread:
     """Variants in each of the ``directions``, and the discrepancy's ``shares`` of the motion.
 
-    The surfaces of ``centre`` and variants are coarser than the model's own: only differences
-    between them count. ``bands`` are the n + 1 edges (Hz) of n bands, of one share (1) each.
-    Unless ``rest_known``, no record began at rest and tells how far motion lies from there, and
-    differences count about their mean. Raises InputError where bands and shares do not pair, these
-    are no shares, or a direction is none.
+    Only differences between ``centre`` and variants count, about their mean where no record tells
+    the rest (``rest_known``). ``bands`` are the n + 1 edges (Hz) of n bands, of one share (1) each.
     """
 
     centre: Variant

@@ -40,11 +40,7 @@ def cut(trace: Trace) -> Iterator[Trace]:
 
 
 def cut_as(blocks: Iterable[Trace], trace: Trace) -> Iterator[Trace]:
-    """Yield a trace cut where blocks end, and as ``cut`` does.
-
-    Where it begins or ends before these blocks, as late readings of them do, so does what is
-    yielded.
-    """
+    """Yield a trace cut where blocks end, and as ``cut`` does; what lies before and after, too."""
     start = trace.first_sample
     for block in blocks:
         stop = max(start, min(end(block), end(trace)))
@@ -83,20 +79,16 @@ class Aligner:
 
 
 class WholeLines:
-    """Gathers lines of ``size`` samples in so many ``rows``; those outside ``lines`` are dropped.
-
-    Keeps one line, however long the scan is.
-    """
+    """Gathers lines of ``size`` samples in so many ``rows``, one at a time; drops all others."""
 
     def __init__(self, lines: range, size: int, rows: int) -> None:
         self._lines = lines
         self._line = np.empty((rows, size))
 
     def add(self, first: int, run: Array) -> Iterator[tuple[int, Array]]:
-        """Take the scan's samples from number ``first`` on, (rows, n), which follow the last ones.
+        """Take samples from number ``first`` on, (rows, n), which follow the last ones.
 
-        Yields each line that they make whole: its number and its samples, (rows, size), which the
-        next line takes the place of.
+        Yields each whole line: its number and its samples, (rows, size), overwritten by the next.
         """
         size = self._line.shape[1]
         position, stop = max(first, self._lines.start), min(first + run.shape[1], self._lines.stop)
@@ -126,39 +118,25 @@ class LineError:
     max_y: float
 
 
-class ErrorLines:
-    """Aligns desired with achieved displacement, and yields each complete line's error.
-
-    Holds one line and the blocks in flight; samples outside the lines are dropped.
-    """
+class LineErrors:
+    """Aligns desired with achieved displacement, and yields each complete line's error."""
 
     def __init__(self, lines: range, samples_per_line: int) -> None:
         self._aligner = Aligner((DESIRED, ACHIEVED))
         self._whole = WholeLines(lines, samples_per_line, len(AXES))
+        self._firsts = lines[::samples_per_line]
 
-    def add(self, name: str, block: Trace) -> Iterator[tuple[int, Array]]:
-        """Take a block of one of the two topics; yield the lines that it makes whole.
+    def add(self, name: str, block: Trace) -> Iterator[LineError]:
+        """Take a block of one of the two topics; yield the lines that it makes whole."""
+        for number, line in self.samples(name, block):
+            yield line_error(number, self._firsts[number], line)
 
-        Each is its number and its error (m) in x and y, (2, samples_per_line), which the next line
-        takes the place of.
-        """
+    def samples(self, name: str, block: Trace) -> Iterator[tuple[int, Array]]:
+        """Yield each whole line's number and error (m), (2, samples), overwritten by the next."""
         self._aligner.add(name, block)
         for desired, achieved in self._aligner.ready():
             error = np.stack([achieved.x - desired.x, achieved.y - desired.y])
             yield from self._whole.add(desired.first_sample, error)
-
-
-class LineErrors:
-    """Yields the figures of the error of each complete line."""
-
-    def __init__(self, lines: range, samples_per_line: int) -> None:
-        self._lines = lines[::samples_per_line]
-        self._errors = ErrorLines(lines, samples_per_line)
-
-    def add(self, name: str, block: Trace) -> Iterator[LineError]:
-        """Take a block of one of the two topics; yield the lines that it makes whole."""
-        for number, line in self._errors.add(name, block):
-            yield line_error(number, self._lines[number], line)
 
 
 def line_error(number: int, first_sample: int, error: Array) -> LineError:
@@ -196,10 +174,9 @@ class MonitorSample:
 
 
 class MonitorSamples:
-    """Aligns three streams of blocks, and yields each sample that is a multiple of a step.
+    """Aligns three streams of blocks, and yields samples, ``MONITOR_RATE`` a second at most.
 
-    The step is the smallest with which they are ``MONITOR_RATE`` a second of the scan at most;
-    ``sample_period`` in s. No sample waits for the drive: a recording may hold none.
+    No sample waits for the drive: a recording may hold none.
     """
 
     def __init__(self, sample_period: float) -> None:

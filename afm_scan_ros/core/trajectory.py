@@ -21,10 +21,7 @@ from afm_scan_ros.core.types import AXES, Array, Trace, channels_of
 
 
 def smooth_step(s: Array) -> Array:
-    """Rise from 0 (s <= 0) to 1 (s >= 1) with least jerk, at rest at both ends.
-
-    The quintic of Flash and Hogan (1985); velocity and acceleration are zero at both ends.
-    """
+    """Rise from 0 to 1 with least jerk, the quintic of Flash and Hogan (1985), rest to rest."""
     s = s.clip(0.0, 1.0)
     near = np.minimum(s, 1.0 - s)
     return _from_both_ends(s, near * near * near * (10.0 + near * (6.0 * near - 15.0)))
@@ -33,8 +30,7 @@ def smooth_step(s: Array) -> Array:
 def soft_ramp(s: Array, share: float) -> Array:
     """Rise from 0 (s <= 0) to 1 (s >= 1) at constant speed, but for both ends.
 
-    ``share`` in [0, 1] of the rise is spent accelerating and braking, one half at each end, each
-    with one half of a Hann-shaped (sin squared) pulse of acceleration; 0 leaves sharp corners.
+    A ``share`` of the rise is spent accelerating and braking, each by half of a Hann-shaped pulse.
     """
     s = s.clip(0.0, 1.0)
     return _from_both_ends(s, _from_corner(np.minimum(s, 1.0 - s), share))
@@ -61,11 +57,7 @@ KEPT = 2
 
 
 def raster(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Displacement in m at sample numbers counted from the first line's start.
-
-    x starts in the middle of a turn-around, at rest at ``-range_x / 2``; before the first line
-    and after the last one it rests there.
-    """
+    """Displacement (m) at sample numbers from the first line's start; x rests before and after."""
     number, way = line_and_way(spec, samples)
     return _line_x(spec)[way], stepped_y(spec, number, way)
 
@@ -86,10 +78,7 @@ def stepped_y(spec: ScanSpec, number: NDArray[np.int64], way: NDArray[np.int64])
 
 
 def step_age(spec: ScanSpec, way: NDArray[np.int64]) -> Array:
-    """Return how many samples ago y began to step, before ``way`` samples of a line.
-
-    A step begins where the trace's constant-speed part ends, and may last into the next line.
-    """
+    """Return how many samples ago y began to step: where the trace's constant-speed part ends."""
     period = float(spec.samples_per_line)
     age: Array = np.mod(way - 0.5 * period * (1.0 - 0.5 * spec.turnaround), period)
     return age
@@ -112,10 +101,7 @@ def _line_rise(spec: ScanSpec) -> Array:
 
 
 def sinusoidal(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Displacement in m at sample numbers counted from the first line's start.
-
-    x starts at rest at ``-range_x / 2`` and swings on before the first line and after the last.
-    """
+    """Displacement (m) at sample numbers from the first line's start, at rest at -range_x / 2."""
     turn = (samples % spec.samples_per_line) / spec.samples_per_line
     y = stepped_y(spec, *line_and_way(spec, samples))
     return -0.5 * spec.range_x * np.cos(2.0 * np.pi * turn), y
@@ -124,10 +110,8 @@ def sinusoidal(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array
 def spiral(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
     """Displacement in m at sample numbers counted from the first turn's start.
 
-    The radius grows over all turns but the last, evenly except in the first and the last of
-    them, where it starts and ends softly. The last turn is the whole outer ellipse, which gives
-    the scan its ranges; after it the scanner stays on that ellipse, before the first turn it
-    rests at the centre.
+    The radius grows over all turns but the last, which is the whole outer ellipse. The scanner
+    rests at the centre before, and stays on the ellipse after.
     """
     growing = spec.lines - 1
     turn = (samples % spec.samples_per_line) / spec.samples_per_line
@@ -138,11 +122,7 @@ def spiral(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
 
 
 def lissajous(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Displacement in m at sample numbers counted from the start, at the centre.
-
-    x has one period a line, y ``lines - 1`` periods in ``lines`` lines, after which the figure
-    closes. It goes on before the first line and after the last.
-    """
+    """Displacement (m) at sample numbers from the centre on: in y one period fewer than in x."""
     return (
         0.5 * spec.range_x * _sine(spec, samples, spec.lines),
         0.5 * spec.range_y * _sine(spec, samples, spec.lines - 1),
@@ -173,8 +153,10 @@ class Phases:
 
 def phases(spec: ScanSpec) -> Phases:
     """Return where each phase of a scan lies; the very last sample is at rest at zero."""
-    prepared = preparation_samples(spec)
-    approached = prepared + approach_samples(spec)
+    prepared = 0
+    if spec.preparation != "none":
+        prepared = round(spec.preparation_cycles / (spec.preparation_rate * spec.sample_period))
+    approached = prepared + max(1, round(spec.approach / spec.sample_period))
     scanned = approached + spec.lines * spec.samples_per_line
     return Phases(
         preparation=range(prepared),
@@ -189,26 +171,14 @@ def total_samples(spec: ScanSpec) -> int:
     return phases(spec).total
 
 
-def approach_samples(spec: ScanSpec) -> int:
-    """Samples from rest at zero to the first line."""
-    return max(1, round(spec.approach / spec.sample_period))
-
-
 def settle_samples(spec: ScanSpec) -> int:
     """Samples from the last line's end to rest at zero."""
     return max(1, round(spec.settle / spec.sample_period))
 
 
-def preparation_samples(spec: ScanSpec) -> int:
-    """Samples that the preparation takes; 0 without one."""
-    if spec.preparation == "none":
-        return 0
-    return round(spec.preparation_cycles / (spec.preparation_rate * spec.sample_period))
-
-
 def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
     """Displacement in m, the same along both axes, at sample numbers from the scan's start."""
-    cycles = spec.preparation_cycles * (samples / preparation_samples(spec))
+    cycles = spec.preparation_cycles * (samples / len(phases(spec).preparation))
     if spec.preparation == "saturate":
         # from zero to the upper bound and back, once a cycle
         return np.asarray(spec.preparation_upper * 0.5 * (1.0 - np.cos(2.0 * np.pi * cycles)))
@@ -216,10 +186,7 @@ def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
 
 
 def _decaying_oscillation(spec: ScanSpec, cycles: Array) -> Array:
-    """Swing between the bounds: a cycle to rise, a whole one, and the rest to decay evenly.
-
-    The decay is linear in time, so that the extrema that the scanner remembers lie evenly.
-    """
+    """Swing between the bounds: a cycle to rise, a whole one, and the rest to decay evenly."""
     rise = min(1.0, 0.25 * spec.preparation_cycles)
     decay = spec.preparation_cycles - 2.0 * rise
     envelope = smooth_step(cycles / rise) * (1.0 - soft_ramp((cycles - 2.0 * rise) / decay, 0.2))
@@ -287,21 +254,13 @@ PATTERN: Mapping[str, Pattern] = {
 
 
 def desired(spec: ScanSpec, first: int, count: int) -> Trace:
-    """Desired displacement in m of samples ``first`` to ``first + count - 1``.
-
-    A function of the sample numbers alone, so that any cut into blocks gives the same values.
-    Samples after the scan's end rest at zero.
-    """
+    """Desired displacement (m) of ``count`` samples, by their numbers alone; zero after the end."""
     x, y = _displacement(spec, np.arange(first, first + count, dtype=np.int64))
     return Trace(first, spec.sample_period, x, y)
 
 
 def stopped(spec: ScanSpec, stop: int, first: int, count: int) -> Trace:
-    """Desired displacement, m, of a scan that an operator stops at sample ``stop``.
-
-    The scan goes on under an envelope that falls smoothly to zero within its settling time: it
-    neither jumps nor leaves the range, whatever its position and velocity were.
-    """
+    """Desired displacement (m) of a scan stopped at a sample: it fades within the settling time."""
     samples = np.arange(first, first + count, dtype=np.int64)
     x, y = _displacement(spec, samples)
     envelope = 1.0 - smooth_step((samples - stop) / settle_samples(spec))
@@ -333,7 +292,7 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
     end = spec.lines * spec.samples_per_line
     if samples[0] >= 0 and samples[-1] <= end:
         return 1.0
-    rise = smooth_step(1.0 + samples / approach_samples(spec))
+    rise = smooth_step(1.0 + samples / len(phases(spec).approach))
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))
 
 

@@ -1,11 +1,12 @@
-"""Frozen records and array types used by the whole package."""
+"""What the whole package uses: arrays, runs of samples, progress, and fields of settings."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
-from attrs import frozen
-from numpy.typing import NDArray
+from attrs import define, field, frozen
+from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
@@ -17,10 +18,7 @@ ProgressCallback: TypeAlias = Callable[[str], None]
 
 
 class Step(str):
-    """What a long computation is doing, when ``done`` of its ``total`` equal parts are over.
-
-    Where ``more`` parts may follow, which are not planned yet, the time left is a lower bound.
-    """
+    """What is done when ``done`` of a ``total`` of parts are over; ``more`` may be planned."""
 
     __slots__ = ("done", "more", "total")
     done: int
@@ -38,9 +36,48 @@ class Step(str):
         return elapsed * (self.total - self.done) / self.done if self.done else None
 
 
+@define
+class Tally:
+    """Counts the parts of a search while more are planned; those ``named`` apart count together."""
+
+    _progress: ProgressCallback
+    _name: str = ""
+    _counts: Counter[str] = field(factory=Counter)
+
+    def named(self, name: str) -> "Tally":
+        """Return a tally that begins what it says with a name."""
+        return Tally(self._progress, f"{self._name}{name}", self._counts)
+
+    def plan(self, parts: int) -> None:
+        """Count parts that are to be done, or fewer of them where ``parts`` is negative."""
+        self._counts["planned"] += parts
+
+    def begin(self, doing: str, parts: int = 1) -> None:
+        """Say what is being done, which takes so many of the parts that are planned."""
+        done, planned = self._counts["done"], self._counts["planned"]
+        self._progress(Step(f"{self._name}{doing}", done, planned, more=True))
+        self._counts["done"] += parts
+
+
+def setting(default: float, unit: str, meaning: str, source: str) -> Any:  # noqa: ANN401 - as attrs.field
+    """Return the field of a settings class; its default follows from the ``source``."""
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "source": source})
+
+
 def floats(values: Iterable[float]) -> tuple[float, ...]:
     """Return any run of numbers as a tuple of floats, which compares by value."""
     return tuple(float(value) for value in values)
+
+
+def pair(values: Iterable[float]) -> tuple[float, float]:
+    """Return two numbers as a tuple of floats."""
+    first, second = values
+    return float(first), float(second)
+
+
+def contiguous(values: ArrayLike) -> Array:
+    """Return numbers as an array of the kind that compiled loops are made for."""
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def by_value(array: Array | None) -> tuple[tuple[int, ...], bytes] | None:
@@ -50,10 +87,9 @@ def by_value(array: Array | None) -> tuple[tuple[int, ...], bytes] | None:
 
 @frozen(eq=False)
 class Trace:
-    """A run of consecutive x-y samples, in m (displacement) or V (drive).
+    """A run of consecutive x-y samples, in m (displacement) or V (drive), (n,) each.
 
-    ``x`` and ``y`` have the same shape (n,); ``x[0]`` is sample ``first_sample`` of its scan and
-    lies at ``first_sample * sample_period`` seconds after the scan's start.
+    ``x[0]`` is sample ``first_sample`` of its scan, from which time counts too.
     """
 
     first_sample: int

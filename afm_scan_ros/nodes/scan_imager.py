@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.image_lines import ImageLines, frame_of
+from afm_scan_ros.core.image_lines import Imaged, ImageLines, frame_of
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files.plant_file import load_sample
@@ -19,7 +19,7 @@ from afm_scan_ros.nodes.block_consumer import StreamReader, min_subscriptions, s
 from afm_scan_ros.nodes.messages import image_message
 from afm_scan_ros.nodes.parameters import NodeParameter
 from afm_scan_ros.nodes.topics import ACHIEVED, DESIRED, RETRACE_IMAGE, TRACE_IMAGE, NodeTopic
-from afm_scan_ros.simulation.sample import Grating, Sample
+from afm_scan_ros.simulation.sample import Grating
 
 MICRO, NANO = 1e-6, 1e-9
 
@@ -83,7 +83,7 @@ class ScanImager(StreamReader):
         for topic, image in self._images.items():
             self.publish(topic, image_message(self.scan, image, self._columns, self.next_sample))
 
-    def _load_sample(self) -> Sample:
+    def _load_sample(self) -> Imaged:
         given = self.settings
         white = NANO * given["sample_height_nm"]
         if given["sample_file"]:

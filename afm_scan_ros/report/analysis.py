@@ -10,10 +10,9 @@ from attrs import field, frozen
 
 from afm_scan_ros.bag.reader import ScanRecording
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import METRES, AxisError, Tracking, TrackingMeter
+from afm_scan_ros.core.metrics import METRES, AxisError, Tracking, TrackingMeter, sensor_doubt
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.sensor_check import sensor_doubt
 from afm_scan_ros.core.streams import ACHIEVED, DESIRED
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.report.sentences import sentence

@@ -4,8 +4,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from afm_scan_ros.core.settings import setting
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, setting
 from afm_scan_ros.report.picture import Curve, Map, Mark, PickedLine, Picture
 
 

@@ -35,10 +35,7 @@ class HysteresisSpec:
 
 @frozen
 class RationalSpec:
-    """A stable, proper transfer function: polynomials in s (rad/s), highest power first.
-
-    Raises InputError where it is not stable, not proper, or has a pole twice.
-    """
+    """A stable, proper transfer function of simple poles; polynomials in s, highest power first."""
 
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
@@ -273,9 +270,7 @@ def with_series(creep: RationalSpec, gains: Array, taus: Array) -> RationalSpec:
 def detuned_axis(axis: AxisSpec, frequency: float, damping: float) -> AxisSpec:
     """Axis whose first resonance has its frequency and damping ratio times these factors.
 
-    Static gain, other poles, zeros and the peaks of further modes are unchanged. The first
-    resonance is the least damped pair of the polynomials' poles. Raises InputError where it would
-    be unstable.
+    Static gain, other poles, zeros and peaks are unchanged. InputError where it would be unstable.
     """
     vibration = _moved(axis.vibration, frequency, damping)
     share = highest_peak(axis.vibration) / highest_peak(vibration)

@@ -4,22 +4,12 @@ x and y are positions of the tip over the sample, m, zero where the scanner rest
 as sharp, and its height as read without error: what an image shows is the scan alone.
 """
 
-from typing import Protocol
-
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
-
-
-class Sample(Protocol):
-    """Anything with a height at each place."""
-
-    def height(self, x: Array, y: Array) -> Array:
-        """Height, m, at positions of one shape, m; the same shape."""
-        ...
 
 
 @frozen
@@ -47,10 +37,9 @@ class Grating:
 
 @frozen(eq=False)
 class HeightMap:
-    """Heights, m, on a regular grid centred on the origin: row 0 at the lowest y, column 0 at x.
+    """Heights (m), (rows, columns), centred on the origin: row 0 at the lowest y, column 0 at x.
 
-    ``heights`` has shape (rows, columns), at least 2 by 2; ``width`` is the distance of the first
-    column from the last, m, and the rows lie as far apart as the columns.
+    ``width`` is the distance of the first column from the last, m; rows lie as far apart.
     """
 
     heights: Array

@@ -46,10 +46,7 @@ class SensorSpec:
 
 @frozen
 class PlantSpec:
-    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m.
-
-    ``mechanisms`` are what the scanner has come to have besides, in the order in which they act.
-    """
+    """A whole scanner; ``sensor_sensitivity`` (m/V) turns the vibration's sensor volts into m."""
 
     amplifier: AmplifierSpec
     sensor: SensorSpec
@@ -86,10 +83,7 @@ class SimulatedElement(Protocol):
 
 @frozen(eq=False)
 class PerAxis:
-    """What each axis does by itself: its hysteresis, or its structure.
-
-    ``starts`` give the state at rest of each axis; ``moves`` take it, a signal and the step (s).
-    """
+    """What each axis does by itself: its ``starts`` at rest, and its ``moves`` by a step (s)."""
 
     starts: tuple[Callable[[], Array | ComplexArray], ...]
     moves: tuple[Callable[[Any, Array, float], tuple[Any, Array]], ...]
@@ -178,8 +172,7 @@ def _held(bank: base.Bank) -> Callable[[Any, Array, float], tuple[Any, Array]]:
 def read(spec: SensorSpec, true: Trace, rng: np.random.Generator) -> Trace:
     """Reading (m) of the true displacement (m): a whole number of quanta.
 
-    Draws one normal number a sample and axis, in the samples' order, so that the readings do not
-    depend on how they are cut into blocks. Raises ScanError where the span is too small.
+    Draws one number a sample and axis, in their order. Raises ScanError beyond the span.
     """
     noise = spec.noise_rms * rng.standard_normal((true.x.size, len(AXES)))
     x, y = (_convert(spec, true, axis, noise[:, i]) for i, axis in enumerate(AXES))
@@ -233,9 +226,8 @@ class Piezoscanner:
     def advance(self, drive: Trace) -> tuple[Trace, Trace]:
         """Measured and true displacement (m) for a block of drive (V) that follows the last one.
 
-        Raises InputError for a gap, a repeated or empty block, unequal axes or another sample
-        period, and ScanError, naming sample, axis and value, beyond a limit of amplifier or
-        sensor. A block that is refused leaves the scanner where it was.
+        Raises InputError for a misplaced block, and ScanError, naming sample, axis and value, at a
+        limit of amplifier or sensor. A block that is refused leaves the scanner where it was.
         """
         self._refuse_misplaced(drive)
         self._spec.amplifier.limits.refuse_beyond(drive, self._drive)

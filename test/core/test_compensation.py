@@ -13,7 +13,7 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
-from afm_scan_ros.core.scanner import Prediction, compensator, predict
+from afm_scan_ros.core.scanner import Prediction, chain_of, predict
 from afm_scan_ros.core.types import AXES, Trace
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.model_file import load_model
@@ -77,7 +77,7 @@ def test_an_axis_that_alone_has_a_play_is_waited_for(inner: set[int]) -> None:
     under = Compensation(model, PERIOD, INVERSES, InverseSettings(), DriveLimits(5.0, 2e5))
     drives = run(under, WAVE, -WAVE, [0, *sorted(inner), TOTAL])
     for axis, target in (("x", WAVE), ("y", -WAVE)):
-        alone = compensator(model.axis(axis), PERIOD, INVERSES, InverseSettings())
+        alone = chain_of(model.axis(axis)).compensator(PERIOD, INVERSES, InverseSettings())
         state, first = alone.invert(alone.inverse_at_rest(), target)
         expected = np.concatenate((first, alone.finish(state)))
         joined = np.concatenate([drive.axis(axis) for drive in drives])

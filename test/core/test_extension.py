@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
-from afm_scan_ros.core.extension import SHARE, extended_axis, unknown_beyond
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
+from afm_scan_ros.core.prediction import SHARE, extended_axis, unknown_beyond
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import Array, channels_of
 from helpers.in_process import ALL, default_model, scan

@@ -14,7 +14,7 @@ from afm_scan_ros.core.model import (
     InverseSettings,
     ScannerModel,
 )
-from afm_scan_ros.core.scanner import compensator, forward
+from afm_scan_ros.core.scanner import chain_of, forward
 
 PERIOD = 5e-5
 SUBSETS = [s for n in range(len(INVERSES) + 1) for s in combinations(INVERSES, n)]
@@ -33,13 +33,13 @@ def rms_error(axis: AxisModel, inverses: tuple[str, ...]) -> float:
     height = 4.0 * axis.vibration.static_gain
     slow, fast = paper.smooth_target(2, 40_000, height), paper.smooth_target(5, 400, height)
     targets = np.concatenate((slow, fast))
-    chain = compensator(axis, PERIOD, inverses, InverseSettings())
+    chain = chain_of(axis).compensator(PERIOD, inverses, InverseSettings())
     error = compensated(chain, axis, targets) - targets
     return float(np.sqrt(np.mean(error**2)) / np.ptp(targets))
 
 
 def test_without_an_inverse_the_drive_is_one_gain(axis: AxisModel) -> None:
-    chain = compensator(axis, PERIOD, (), InverseSettings())
+    chain = chain_of(axis).compensator(PERIOD, (), InverseSettings())
     targets = paper.smooth_target(3, 100, 1e-5)
     _, drive = chain.invert(chain.inverse_at_rest(), targets)
     gain = axis.hysteresis.forward.chord * axis.vibration.static_gain
@@ -59,14 +59,16 @@ def test_the_direct_inverse_is_used_where_asked(axis: AxisModel) -> None:
     targets = paper.smooth_target(3, 2000, 4.0 * axis.vibration.static_gain)
     drives = []
     for kind in ("exact", "direct"):
-        chain = compensator(axis, PERIOD, ["hysteresis"], InverseSettings(hysteresis_inverse=kind))
+        chain = chain_of(axis).compensator(
+            PERIOD, ["hysteresis"], InverseSettings(hysteresis_inverse=kind)
+        )
         drives.append(chain.invert(chain.inverse_at_rest(), targets)[1])
     assert np.abs(drives[0] - drives[1]).max() > 0.01
 
 
 def test_an_unknown_inverse_is_refused_by_name(axis: AxisModel) -> None:
     with pytest.raises(InputError, match="'drift': choose among creep, hysteresis, vibration"):
-        compensator(axis, PERIOD, ["creep", "drift"], InverseSettings())
+        chain_of(axis).compensator(PERIOD, ["creep", "drift"], InverseSettings())
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.errors import ScanError
-from afm_scan_ros.core.least_squares import require_converged
 
 
 def valley(at: np.ndarray) -> np.ndarray:

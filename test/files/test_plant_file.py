@@ -8,9 +8,8 @@ from attrs import evolve
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.mechanisms import PLUGINS
-from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
-from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.electronics import DelayedConverter, TiltedSensor
 
 DEFAULT = Path(__file__).parents[2] / "config/plant.yaml"
 

@@ -4,8 +4,7 @@ import pytest
 from attrs import define
 
 import afm_scan_ros as afm
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Step
+from afm_scan_ros.core.types import Step, Tally
 from afm_scan_ros.progress import Stopwatch
 
 

@@ -16,8 +16,8 @@ from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.axis import AxisSpec
 from afm_scan_ros.simulation.mechanisms import mechanism_type
-from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
 from afm_scan_ros.simulation.mechanisms.base import Alteration, Mechanism
+from afm_scan_ros.simulation.mechanisms.electronics import DelayedConverter
 from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers import mechanism_laws as laws
 from helpers.mechanism_laws import PERIOD, X, run

@@ -7,9 +7,9 @@ from scipy import linalg, optimize
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.mechanisms.base import Insert
+from afm_scan_ros.simulation.mechanisms.electronics import CyclicEncoder, TiltedPlate, TiltedSensor
 from afm_scan_ros.simulation.mechanisms.environment import FloorVibration, WarmingFrame
 from afm_scan_ros.simulation.mechanisms.material import CreepingMount
-from afm_scan_ros.simulation.mechanisms.sensor import CyclicEncoder, TiltedPlate, TiltedSensor
 from afm_scan_ros.simulation.mechanisms.structure import LooseJoint, ScannerBow, StiffeningFlexure
 
 STEP = 5e-6

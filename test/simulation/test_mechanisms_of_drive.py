@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import PlayBank
-from afm_scan_ros.simulation.mechanisms.amplifier import (
+from afm_scan_ros.simulation.mechanisms.base import Insert
+from afm_scan_ros.simulation.mechanisms.electronics import (
     DelayedConverter,
     LaggingAmplifier,
     LimitedAmplifier,
 )
-from afm_scan_ros.simulation.mechanisms.base import Insert
 from afm_scan_ros.simulation.mechanisms.material import ViscousBlocks
 from afm_scan_ros.simulation.scanner import PlantSpec
 

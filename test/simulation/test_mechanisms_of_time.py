@@ -15,7 +15,7 @@ from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
 from afm_scan_ros.simulation.mechanisms.attachment import AttachedStage
 from afm_scan_ros.simulation.mechanisms.base import Ageing, Mechanism
-from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad, SettlingFrame, SwingingRoom
+from afm_scan_ros.simulation.mechanisms.environment import ChangingLoad, SettlingFrame, SwingingRoom
 from afm_scan_ros.simulation.mechanisms.structure import HeavierLoad
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 from helpers import mechanism_laws as laws

@@ -31,8 +31,7 @@ from afm_scan_ros.core.effects.residual_features import ResidualFeatures, promin
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Array, floats
+from afm_scan_ros.core.types import Array, Tally, floats
 
 ALONG = TYPICAL_SHARE / FREEDOM
 """Power of a healthy residual along one influence, in detection limits squared."""

@@ -41,13 +41,12 @@ from afm_scan_ros.core.diagnosis.result import (
 from afm_scan_ros.core.diagnosis.structure import counted_exact, refitted
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import with_overshoot
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.model import Added, AxisModel, ScannerModel
+from afm_scan_ros.core.prediction import with_overshoot
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import synchronised
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import ProgressCallback
+from afm_scan_ros.core.types import ProgressCallback, Tally
 
 SEVERITY = (SUFFICIENT, INSUFFICIENT, FOUND, AMBIGUOUS, UNEXPLAINED)
 """Verdicts in the order of severity; the scanner has the most severe of its axes."""

@@ -14,7 +14,7 @@ from attrs import evolve
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.settings import POSTERIOR
-from afm_scan_ros.core.prediction_error import varied
+from afm_scan_ros.core.prediction import varied
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array

@@ -20,8 +20,7 @@ from afm_scan_ros.core.diagnosis.candidates import (
 )
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Tally
 
 NEARLY = 0.01
 """Probability, relative to the most probable set, from which on a set is considered beside it."""

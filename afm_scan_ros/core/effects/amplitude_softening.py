@@ -28,10 +28,7 @@ MEMORY = EffectParameter("memory", "s", 1e-9, 1e6)
 
 @frozen
 class Softening:
-    """Compliance and gain of each actuator that grow with the logarithm of its level.
-
-    The level is that of ``memory`` samples, or of the whole run if that is infinite.
-    """
+    """Compliance and gain that grow with the logarithm of the level of ``memory`` samples."""
 
     actuators: Actuators
     memory: float = np.inf

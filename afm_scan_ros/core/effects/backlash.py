@@ -11,7 +11,6 @@ friction holds x while it is not pushed, and x is too light to act back on x₀.
 from collections.abc import Iterator
 
 import numpy as np
-from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
@@ -49,17 +48,9 @@ def _lead(state: Array, half: float, block: Array, lead: Array) -> None:
     state[:] = ahead, last
 
 
-@frozen(eq=False)
-class Crossing:
-    """State of the inverse.
-
-    Last lead and target ``turned``, m, shape (2,), the leads that the ``mean`` needs, m, and the
-    ``targets`` whose lead is not known yet, m.
-    """
-
-    turned: Array
-    mean: Array
-    targets: Array
+Crossing = tuple[Array, Array, Array]
+"""State of the inverse, m: last lead and target (2,), the leads that the mean needs, and the
+targets whose lead is not known yet."""
 
 
 class Backlash:
@@ -88,19 +79,19 @@ class Backlash:
 
     def inverse_at_rest(self) -> Crossing:
         """State in the middle."""
-        return Crossing(np.zeros(2), self._mean.at_rest(), np.empty(0))
+        return np.zeros(2), self._mean.at_rest(), np.empty(0)
 
     def invert(self, state: Crossing, block: Array) -> tuple[Crossing, Array]:
         """Displacement before the play that gives ``block`` behind it, both in m."""
-        turned, lead = state.turned.copy(), np.empty_like(block)
+        turned, lead = state[0].copy(), np.empty_like(block)
         _lead(turned, self._half, block, lead)
-        mean, known = self._mean.invert(state.mean, lead)
-        targets, waiting = np.split(np.concatenate((state.targets, block)), [len(known)])
-        return Crossing(turned, mean, waiting), targets + known
+        mean, known = self._mean.invert(state[1], lead)
+        targets, waiting = np.split(np.concatenate((state[2], block)), [len(known)])
+        return (turned, mean, waiting), targets + known
 
     def finish(self, state: Crossing) -> Array:
         """Return the samples still owed, as if the last lead were held."""
-        return np.asarray(state.targets + self._mean.finish(state.mean))
+        return np.asarray(state[2] + self._mean.finish(state[1]))
 
 
 def _crossed_in(width: float, time: float, sample_period: float) -> Backlash:

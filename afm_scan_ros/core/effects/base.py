@@ -119,11 +119,26 @@ class CausalInverse(ABC):
         return np.empty(0)
 
 
+class Recursion(CausalInverse):
+    """Base of effects that step from sample to sample, and whose inverse solves the same steps."""
+
+    @abstractmethod
+    def run(self, state: Any, block: Array, direction: float) -> tuple[Any, Array]:  # noqa: ANN401
+        """State after a block, and its outputs where ``direction`` is 1, its inputs where -1."""
+
+    def apply(self, state: Any, block: Array) -> tuple[Any, Array]:  # noqa: ANN401
+        """Outputs for a block of inputs, both (n,)."""
+        return self.run(state, block, 1.0)
+
+    def invert(self, state: Any, block: Array) -> tuple[Any, Array]:  # noqa: ANN401
+        """Inputs for a block of outputs, both (n,)."""
+        return self.run(state, block, -1.0)
+
+
 class StatelessEffect(CausalInverse):
     """Base of effects whose output depends on the present input alone; the state is None.
 
-    They do not depend on the sample period, so each is its own element of a chain. Subclasses are
-    frozen attrs classes, which compare by value.
+    Each is its own element of a chain: a frozen class, which compares by value.
     """
 
     @abstractmethod
@@ -158,10 +173,7 @@ each step squares the error, two reach rounding."""
 def solved(
     curve: Callable[[Array], tuple[Array, Array]], levels: Array, heights: Array, wanted: Array
 ) -> Array:
-    """Where a rising curve has the heights ``wanted`` (n,), by Newton's method from a table of it.
-
-    ``curve`` gives height and slope, and goes on straight beyond its ``levels``.
-    """
+    """Where a rising ``curve``, of height and slope, has the heights wanted, by Newton's method."""
     found = np.interp(wanted, heights, levels)
     for _ in range(NEWTON_STEPS):
         height, slope = curve(found)
@@ -196,9 +208,8 @@ class ChainElement(Protocol[E_co]):
 class Element(Generic[E]):
     """An effect and its parameters, which may be numbers, strings, tuples and frozen records.
 
-    ``make`` is the effect's class, or a function of a module: it takes the parameters and, as its
-    last argument, the sample period (s). Both are compared, so a lambda or a closure would never
-    equal another one.
+    ``make`` is a class or a function of a module, of the parameters and the sample period (s).
+    Both are compared, so a lambda or a closure would never equal another one.
     """
 
     make: Callable[..., E]

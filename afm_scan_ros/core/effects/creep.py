@@ -13,18 +13,14 @@ import numpy as np
 from attrs import field, frozen
 
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import CausalInverse
+from afm_scan_ros.core.effects.base import Recursion
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
 
 
 @frozen
 class CreepModel:
-    """Gains (dimensionless) and time constants (s) of the sections, one each.
-
-    Raises InputError where they do not pair, are not finite, or where a time constant is not
-    positive.
-    """
+    """Gains (1) and time constants (s > 0) of the sections; InputError unless these pair."""
 
     gains: tuple[float, ...] = field(converter=floats)
     time_constants: tuple[float, ...] = field(converter=floats)
@@ -40,39 +36,22 @@ class CreepModel:
         if min(self.time_constants, default=1.0) <= 0.0:
             raise InputError(f"creep time_constants must be positive: {self.time_constants}")
 
-    @property
-    def static_gain(self) -> float:
-        """Gc(0): what a step has grown to, relative to its first instant, after all creep."""
-        return 1.0 + sum(self.gains)
-
 
 @compiled
-def _apply(state: Array, gains: Array, decay: Array, block: Array, result: Array) -> None:
+def _run(
+    state: Array, gains: Array, decay: Array, block: Array, direction: float, result: Array
+) -> None:
     for k in range(block.size):
-        u = block[k]
-        total = u
+        result[k] = block[k]
         for i in range(state.size):
-            total += state[i]
-            state[i] += decay[i] * (state[i] - gains[i] * u)
-        result[k] = total
-
-
-@compiled
-def _invert(state: Array, gains: Array, decay: Array, block: Array, result: Array) -> None:
-    for k in range(block.size):
-        u = block[k]
-        for i in range(state.size):
-            u -= state[i]
+            result[k] += direction * state[i]
+        u = block[k] if direction > 0.0 else result[k]
         for i in range(state.size):
             state[i] += decay[i] * (state[i] - gains[i] * u)
-        result[k] = u
 
 
-class Creep(CausalInverse):
-    """Creep of one axis; the state is the output of each section, shape (sections,).
-
-    The inverse solves each step of the discrete system for its input, so it is exact.
-    """
+class Creep(Recursion):
+    """Creep of one axis (m), with its exact inverse; the state is the output of each section."""
 
     def __init__(self, model: CreepModel, sample_period: float) -> None:
         self._gains = np.array(model.gains)
@@ -82,14 +61,8 @@ class Creep(CausalInverse):
         """State of a scanner that has long rested at zero."""
         return np.zeros_like(self._gains)
 
-    def apply(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Displacement with creep, for a block of displacement without, both (n,)."""
+    def run(self, state: Array, block: Array, direction: float) -> tuple[Array, Array]:
+        """State, and displacement with or without creep."""
         state, result = state.copy(), np.empty(len(block))
-        _apply(state, self._gains, self._decay, block, result)
-        return state, result
-
-    def invert(self, state: Array, block: Array) -> tuple[Array, Array]:
-        """Displacement without creep that gives ``block`` with it, both (n,)."""
-        state, result = state.copy(), np.empty(len(block))
-        _invert(state, self._gains, self._decay, block, result)
+        _run(state, self._gains, self._decay, block, direction, result)
         return state, result

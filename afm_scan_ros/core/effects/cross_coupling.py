@@ -28,14 +28,13 @@ from afm_scan_ros.core.effects.residual_features import (
     CandidateMode,
     ResidualFeatures,
     amounts,
-    likely_modes,
+    modes_or_usual,
 )
 from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance, held, resonant
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 
 LIKELY = tuple(CandidateMode(frequency, 0.02) for frequency in (100.0, 300.0, 1000.0))
-SOUGHT = 3
 SHARE = EffectParameter("share", "1", -0.3, 0.3, 1e-6)
 FREQUENCY = EffectParameter("frequency", "Hz", 5.0, 2e4, 0.01, neutral=300.0, excited=True)
 DAMPING = EffectParameter("damping", "1", 1e-3, 0.7, 1e-5, neutral=0.02)
@@ -100,8 +99,7 @@ def _with_structure(chain: Chain, share: float, structure: VibrationModel) -> Ch
 
 def starts_dynamic(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Modes by which the residual's ratio to the other axis bends, then where they often lie."""
-    found = likely_modes(features.other, features.residual, features.sample_period, SOUGHT)
-    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+    for mode in modes_or_usual(features.other, features, LIKELY):
         yield 1e-3, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 
@@ -115,11 +113,7 @@ def starts_modal(features: ResidualFeatures) -> Iterator[tuple[float, float, flo
 
 
 def starts_coupled_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
-    """The share that the residual holds, with modes as of a light structure.
-
-    A coupled mode near the stage's own resonance splits it in two, so the first step of a fit from
-    a share near zero points in a wrong direction.
-    """
+    """The share that the residual holds: from one near zero a fit goes in a wrong direction."""
     (share,) = amounts(features.residual, features.other)
     for small, frequency, damping in starts_dynamic(features):
         yield max(small, SHARE.nearest(share)), frequency, damping

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element, Recursion
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
 from afm_scan_ros.core.types import Array
@@ -33,13 +33,8 @@ def settles(time: Array) -> Array:
     return np.asarray(-np.expm1(-time))
 
 
-def slows(time: Array) -> Array:
-    """A logarithm."""
-    return np.asarray(np.log1p(time))
-
-
 @frozen
-class Drift(CausalInverse):
+class Drift(Recursion):
     """Motion with time; the state is the index of the next sample."""
 
     course: Course
@@ -51,17 +46,12 @@ class Drift(CausalInverse):
         """Index of the first sample."""
         return 0
 
-    def apply(self, state: int, block: Array) -> tuple[int, Array]:
-        """Displacement with drift, of one without, both (n,) in m."""
-        return state + len(block), block + self._moved(state, len(block))
-
-    def invert(self, state: int, block: Array) -> tuple[int, Array]:
-        """Displacement without drift that gives ``block`` with it, both (n,) in m."""
-        return state + len(block), block - self._moved(state, len(block))
-
-    def _moved(self, first: int, count: int) -> Array:
-        age = self.sample_period * np.arange(first, first + count, dtype=np.float64)
-        return self.rate * self.settling * self.course(age / self.settling)
+    def run(self, state: int, block: Array, direction: float) -> tuple[int, Array]:
+        """Index of the sample after a block, and displacement (m) with or without the drift."""
+        after = state + len(block)
+        age = self.sample_period * np.arange(state, after, dtype=np.float64)
+        moved = self.rate * self.settling * self.course(age / self.settling)
+        return after, block + direction * moved
 
 
 def form(
@@ -108,6 +98,6 @@ def drift() -> EffectType:
         confusable=("periodic_disturbance", "slow_creep"),
         forms=(
             form("", settles, text="exponential", example=(1e-7, 30.0)),
-            form("logarithmic", slows, example=(1e-7, 0.5), text="", refines=""),
+            form("logarithmic", np.log1p, example=(1e-7, 0.5), text="", refines=""),
         ),
     )

@@ -56,8 +56,7 @@ class FeedbackElement(Protocol):
     def added(self, drive: Array, output: Array, run: int) -> Array:
         """Inputs (n, added) of drive (n, m) in V and output (n, p) in m.
 
-        The first ``run`` samples count: all n of a period in steady state; fewer of a run from
-        rest, which zeros follow.
+        All samples are a period in steady state; fewer, a ``run`` from rest, which zeros follow.
         """
         ...
 
@@ -245,9 +244,7 @@ REGISTERED: dict[str, EffectType] = {}
 
 
 def register(describe: Callable[[], EffectType]) -> Callable[[], EffectType]:
-    """Register the effect that a function describes.
-
-    Where it states no ``physics``, that is the docstring of the function's module.
+    """Register the effect that a function describes, with its module's docstring as ``physics``.
 
     Raises InputError where another effect has the name.
     """

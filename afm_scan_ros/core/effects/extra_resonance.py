@@ -37,6 +37,7 @@ from afm_scan_ros.core.effects.residual_features import (
     CandidateMode,
     ResidualFeatures,
     likely_modes,
+    modes_or_usual,
 )
 from afm_scan_ros.core.effects.vibration import OSCILLATES, first_resonance, resonant
 from afm_scan_ros.core.types import Array
@@ -49,7 +50,6 @@ TIMES = 1.0 / (2.0 * np.pi * np.geomspace(FREQUENCY.lower, FREQUENCY.upper, 200)
 LIKELY = tuple(
     CandidateMode(frequency, 0.02) for frequency in (200.0, 450.0, 900.0, 1500.0, 3000.0)
 )
-SOUGHT = 5
 HEAVY = tuple(CandidateMode(float(frequency), 0.02) for frequency in np.geomspace(300.0, 2000.0, 8))
 MASSES = (0.05, 0.1, 0.2, 0.4)
 SEEN = 3
@@ -109,8 +109,7 @@ def starts_series_mode(features: ResidualFeatures) -> Iterator[tuple[float, floa
 def starts_absorber_mode(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """A tenth of the mass where modes are seen, a range of masses where they often lie.
 
-    A light one hardly moves the resonance that it is to move; a heavy one moves it so far that
-    the residual shows the resonance and no mode.
+    A heavy one moves the resonance so far that the residual shows it and no mode.
     """
     seen = likely_modes(_predicted(features), features.residual, features.sample_period, SEEN)
     for mass, mode in (*product((0.1,), seen), *product(MASSES, HEAVY)):
@@ -123,10 +122,7 @@ def starts_parallel(features: ResidualFeatures) -> Iterator[tuple[float, float, 
 
 
 def starts_drive(features: ResidualFeatures) -> Iterator[tuple[float, float]]:
-    """For some dampings, the period by which the prediction's ringing reduces the residual most.
-
-    The comparison uses all spectral lines, because a periodic drive has only a few.
-    """
+    """For some dampings, the period whose ringing reduces the residual most, over all lines."""
     window, period = (
         scipy.signal.windows.hann(len(features.residual), sym=False),
         features.sample_period,
@@ -144,8 +140,7 @@ def _predicted(features: ResidualFeatures) -> Array:
 
 
 def _starts(cause: Array, features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
-    found = likely_modes(cause, features.residual, features.sample_period, SOUGHT)
-    for mode in (*found, *LIKELY[: SOUGHT - len(found)]):
+    for mode in modes_or_usual(cause, features, LIKELY):
         yield 1e-4, FREQUENCY.nearest(mode.frequency), DAMPING.nearest(mode.damping)
 
 

@@ -21,11 +21,11 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element, Recursion
 from afm_scan_ros.core.effects.effect_type import (
     EffectForm,
     EffectParameter,
@@ -57,29 +57,20 @@ SHARES = tuple(
 )
 
 
-@frozen(eq=False)
-class Loop:
-    """State: of the resonance ``inner`` (2,), the ``plays`` (m), last force f and last x (m)."""
-
-    inner: Array
-    plays: Array
-    force: float
-    last: float
+State = tuple[Array, Array, float, float]
+"""Of the resonance (2,), of the plays (m), the last force f and the last x (m)."""
 
 
 @compiled
 def _run(
     system: tuple[Array, Array, Array],
     material: tuple[Array, Array, float],
-    state: tuple[Array, Array, float, float],
+    state: State,
     block: Array,
     direction: float,
     result: Array,
 ) -> tuple[float, float]:
-    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
-
-    Each period has the force at its middle. Forwards, its end is predicted with the last force.
-    """
+    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x."""
     (a, b, c), (inner, plays, force, last) = system, state
     thresholds, shares, missing = material
     pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
@@ -100,12 +91,11 @@ def _run(
     return force, last
 
 
-class HystereticStiffness(CausalInverse):
+class HystereticStiffness(Recursion):
     """What yields beside the spring of a resonance, in feedback on the displacement.
 
-    ``material`` is (thresholds (m), kᵢ, b), the first two (``ELEMENTS``,). The inverse knows x, so
-    it runs the same loop along the target and subtracts u. It is exact except for the predicted end
-    of each period, as above.
+    ``material`` is (thresholds (m), kᵢ, b). The inverse knows x, so it runs the same loop along the
+    target and subtracts u: exact but for the predicted end of each period.
     """
 
     def __init__(
@@ -116,23 +106,16 @@ class HystereticStiffness(CausalInverse):
         thresholds, shares, balance = material
         self._material = thresholds, shares, balance * float(shares.sum())
 
-    def at_rest(self) -> Loop:
+    def at_rest(self) -> State:
         """State at rest at zero, all plays in the middle."""
-        return Loop(np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0)
+        return np.zeros(2), np.zeros(ELEMENTS), 0.0, 0.0
 
-    def apply(self, state: Loop, block: Array) -> tuple[Loop, Array]:
-        """Displacement x for a block of x₀, both (n,) in m."""
-        return self._ran(state, block, 1.0)
-
-    def invert(self, state: Loop, block: Array) -> tuple[Loop, Array]:
-        """Displacement x₀ that gives a block of x, both (n,) in m."""
-        return self._ran(state, block, -1.0)
-
-    def _ran(self, state: Loop, block: Array, direction: float) -> tuple[Loop, Array]:
-        inner, plays, result = state.inner.copy(), state.plays.copy(), np.empty_like(block)
-        moving = inner, plays, state.force, state.last
+    def run(self, state: State, block: Array, direction: float) -> tuple[State, Array]:
+        """State, and displacement x for x₀ or x₀ for x, both (n,) in m."""
+        inner, plays, result = state[0].copy(), state[1].copy(), np.empty_like(block)
+        moving = inner, plays, *state[2:]
         ended = _run(self._system, self._material, moving, block, direction, result)
-        return Loop(inner, plays, *ended), result
+        return (inner, plays, *ended), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:
@@ -146,10 +129,7 @@ def insert_spectrum(chain: Chain, values: Array) -> Chain:
 
 
 def spectrum(shares: Sequence[float], scale: float = 1.0) -> tuple[Array, Array]:
-    """Thresholds (m) and shares of the elements that have such shares about the ``KNOTS``.
-
-    ``scale`` is that of lengths.
-    """
+    """Thresholds (m) and shares of elements with such shares about the ``KNOTS`` of a ``scale``."""
     knots = np.log(scale * np.array(KNOTS))
     levels = np.linspace(knots[0], knots[-1], ELEMENTS)
     hats = np.stack([np.interp(levels, knots, peak) for peak in np.eye(len(KNOTS))])
@@ -175,8 +155,7 @@ def _with_element(chain: Chain, make: Callable[..., HystereticStiffness], values
 def starts(features: ResidualFeatures) -> Iterator[tuple[float, float, float]]:
     """Thresholds from far below the motion to about as large, each a minimum of its own.
 
-    A base model counts nothing of what yields as missing, or all of it; what lies between fits
-    any threshold half, and leads away from the true one.
+    A base model counts nothing of what yields as missing, or all of it.
     """
     reach = 0.5 * float(np.ptp(features.displacement))
     for part, balance in product((0.05, 0.2, 0.8), (0.0, 1.0)):

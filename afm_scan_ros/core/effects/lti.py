@@ -58,10 +58,7 @@ def _filter(
 
 @frozen(eq=False)
 class SampledSystem:
-    """The system above, with shapes (n, n), (n,), (n,) and a ``delay`` in samples.
-
-    The state is x, then the inputs that are still delayed: shape (n + delay,).
-    """
+    """The system above, with a ``delay`` in samples; the state is x, then the inputs delayed."""
 
     a: Array = field(converter=np.ascontiguousarray)
     b: Array = field(converter=np.ascontiguousarray)
@@ -101,10 +98,7 @@ def pole_of(lag: float) -> float:
 
 
 def mean_over_holds(pole: complex, sample_period: float) -> SampledSystem:
-    """Return the system of gain 1 from a held input to its mean over each hold.
-
-    ``pole`` is in rad/s; of a complex one the conjugate is a pole too. -inf lets all pass.
-    """
+    """System of gain 1 from a held input to its mean, of a pole (rad/s) or a pair; -inf: none."""
     turn = pole * sample_period
     passed = -np.expm1(turn)
     mean = -passed / turn * (1.0 + 1j * pole.real / pole.imag if pole.imag else 1.0)

@@ -58,10 +58,7 @@ class ElongationSlips:
 
 
 def slips(signal: Array, thresholds: tuple[float, ...], run: int) -> Array:
-    """Return v - p of signals (n, channels): (n, channels * thresholds), zero after ``run``.
-
-    In steady state where ``run`` is all of the signal, else from plays at rest in the middle.
-    """
+    """Return v - p, (n, channels * thresholds): of a steady period, or of a ``run`` from rest."""
     periods = PERIODS if run == len(signal) else 1
     slipped = _slips(np.ascontiguousarray(signal[:run]), np.array(thresholds), periods)
     return np.pad(slipped, ((0, len(signal) - run), (0, 0)))

@@ -15,11 +15,10 @@ is of the order (ωT)².
 from collections.abc import Iterator
 
 import numpy as np
-from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element, Recursion
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.vibration import Resonance, VibrationModel, first_resonance, held
@@ -32,29 +31,20 @@ QUADRATIC, CUBIC = (
 )
 
 
-@frozen(eq=False)
-class Deflection:
-    """State: of the resonance ``inner`` (2,), the last force f and the last x (m)."""
-
-    inner: Array
-    force: float
-    last: float
+State = tuple[Array, float, float]
+"""Of the resonance (2,), the last force f and the last x (m)."""
 
 
 @compiled
 def _run(
     system: tuple[Array, Array, Array],
     spring: tuple[float, float],
-    state: tuple[Array, float, float],
+    state: State,
     block: Array,
     direction: float,
     result: Array,
 ) -> tuple[float, float]:
-    """From x₀ to x with ``direction`` 1, from x to x₀ with -1; return the last f and x.
-
-    Forwards, the force at the end of a period depends on the x there, and is found by two steps of
-    Newton's method from the force before.
-    """
+    """From x₀ to x by two of Newton's steps a sample, or from x to x₀ (-1); return last f and x."""
     (a, b, c), (inner, force, last), (square, cube) = system, state, spring
     pushed, (first, second) = c[0] * b[0] + c[1] * b[1], inner
     before = -(square * last**2 + cube * last**3)
@@ -78,11 +68,10 @@ def _run(
     return force, last
 
 
-class NonlinearSpring(CausalInverse):
+class NonlinearSpring(Recursion):
     """What the spring of a resonance has beyond a straight line, in feedback on the displacement.
 
-    ``square`` is in 1/m, ``cube`` in 1/m². The inverse knows x, so it runs the same loop along the
-    target and subtracts u.
+    The inverse knows x, so it runs the same loop along the target and subtracts u.
     """
 
     def __init__(
@@ -91,32 +80,21 @@ class NonlinearSpring(CausalInverse):
         system = held(VibrationModel(resonance.factor[-1:], resonance.factor), sample_period)
         self._system, self._spring = (system.a, system.b, system.c), (square, cube)
 
-    def at_rest(self) -> Deflection:
+    def at_rest(self) -> State:
         """State at rest at zero."""
-        return Deflection(np.zeros(2), 0.0, 0.0)
+        return np.zeros(2), 0.0, 0.0
 
-    def apply(self, state: Deflection, block: Array) -> tuple[Deflection, Array]:
-        """Displacement x for a block of x₀, both (n,) in m.
-
-        Raises ScanError where it grows without bound, as of a spring that turns back.
-        """
-        after, moved = self._ran(state, block, 1.0)
-        if not np.isfinite(moved).all():
+    def run(self, state: State, block: Array, direction: float) -> tuple[State, Array]:
+        """State, and x for x₀ or x₀ for x (m); raises ScanError where x grows without bound."""
+        inner, result = state[0].copy(), np.empty_like(block)
+        moving = inner, *state[1:]
+        ended = _run(self._system, self._spring, moving, block, direction, result)
+        if direction > 0.0 and not np.isfinite(result).all():
             raise ScanError(
                 "nonlinear_spring: with these coefficients the spring turns back within the"
                 " motion: choose smaller ones"
             )
-        return after, moved
-
-    def invert(self, state: Deflection, block: Array) -> tuple[Deflection, Array]:
-        """Displacement x₀ that gives a block of x, both (n,) in m."""
-        return self._ran(state, block, -1.0)
-
-    def _ran(self, state: Deflection, block: Array, direction: float) -> tuple[Deflection, Array]:
-        inner, result = state.inner.copy(), np.empty_like(block)
-        moving = inner, state.force, state.last
-        ended = _run(self._system, self._spring, moving, block, direction, result)
-        return Deflection(inner, *ended), result
+        return (inner, *ended), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:

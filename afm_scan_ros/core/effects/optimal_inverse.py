@@ -85,9 +85,7 @@ class Weight(Protocol):
 class SmoothWeight:
     """R/Q = (ω̃ / 2π corner)^(2 order) with ω̃ = (2/T) sin(ωT/2); ``corner`` in Hz.
 
-    Zero at ω = 0, so a scanner at rest is placed exactly. Rational in ω² for continuous time and
-    in z for the sampled system, so the inverse's response dies out exponentially both ways and a
-    finite preview suffices.
+    Zero at rest. Rational, so the inverse's response dies out exponentially both ways.
     """
 
     corner: float = field(converter=float, validator=gt(0.0))
@@ -120,8 +118,7 @@ class RelativeWeight:
 class MultipliedWeight:
     """R/Q times ``squared``, |m|² at angular frequencies (rad/s), of a system m G.
 
-    Its optimal inverse is that of G and then 1/m, exactly: the modified trajectory stays the one
-    that R/Q was chosen for. So does what G lacks and m multiplies too, m ΔG U = ΔG U_G.
+    Its optimal inverse is that of G and then 1/m, exactly: the modified trajectory stays as it was.
     """
 
     weight: Weight
@@ -189,8 +186,7 @@ def sampled_kernel(response: Response, weight: Weight, sample_period: float, siz
 def optimal_kernel(response: Response, weight: Weight, sample_period: float) -> Kernel:
     """Impulse response of the optimal inverse, on a grid long enough to hold both its ends.
 
-    ``response`` gives G at angular frequencies 0 to π/T. Raises InputError where the response
-    does not die out, as under a weight with a step, stating the tail.
+    Raises InputError where it does not die out, as under a weight with a step, stating the tail.
     """
     size = SHORTEST
     while True:
@@ -210,8 +206,7 @@ def optimal_kernel(response: Response, weight: Weight, sample_period: float) -> 
 class OptimalInverse:
     """Filter by a kernel, as a stream that looks ``preview`` samples ahead, or all at once.
 
-    The state is the run of targets still needed, oldest first. The stream starts from rest at
-    zero before sample 0 and takes the last sample as held after the end.
+    The state is the run of targets still needed, from rest on. The last one is taken as held.
     """
 
     def __init__(self, kernel: Kernel, preview: int) -> None:
@@ -247,8 +242,7 @@ class OptimalInverse:
 class OptimalInverses:
     """Streams of several axes, each with its own optimal inverse, that look equally far ahead.
 
-    The state is the run of each axis' targets still needed, shape (axes, n), oldest first. Blocks
-    that are short become the rows of one transform, which takes less time than one for each.
+    The state is the run of targets still needed, (axes, n). Short blocks share one transform.
     """
 
     def __init__(self, inverses: Sequence[OptimalInverse]) -> None:

@@ -94,10 +94,7 @@ def insert_warmth(chain: Chain, values: Array) -> Chain:
 
 
 def insert_hysteresis(chain: Chain, values: Array) -> Chain:
-    """Multiply the part of the hysteresis that has memory by a factor.
-
-    The direct inverse's surface is changed alike, which is right to first order in H.
-    """
+    """Multiply what has memory by a factor, also of the direct inverse: right to first order."""
     (factor,) = values
     base = chain.model.hysteresis
     forward, direct = base.forward.with_share(factor), base.direct.with_share(factor)

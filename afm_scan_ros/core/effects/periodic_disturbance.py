@@ -50,8 +50,7 @@ APART = 2.0
 def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
     """Add the harmonics to a signal, of which each sample is later by ``turn`` (rad).
 
-    A stretch at once, by Horner's rule, its real and imaginary parts apart: so the machine takes
-    several samples together. Stretches begin where they do for any cut into blocks.
+    A stretch at once, by Horner's rule, real and imaginary parts apart, for vector instructions.
     """
     near, n = np.exp(1j * turn * np.arange(STRETCH)), 0
     real, imaginary = np.empty(STRETCH), np.empty(STRETCH)
@@ -76,8 +75,7 @@ def _move(harmonics: Harmonics, turn: float, first: int, signal: Array) -> None:
 class Disturbance(CausalInverse):
     """Motion, or volts, with time, which an inverse leaves alone; state: index of the next sample.
 
-    ``harmonics`` are aₖ - j bₖ, from the first on. At what phase the next scan will meet it
-    nobody knows, so there is nothing to subtract.
+    ``harmonics`` are aₖ - j bₖ, from the first on. Their phase in the next scan is unknown.
     """
 
     harmonics: tuple[complex, ...]
@@ -192,10 +190,9 @@ def _driven(features: ResidualFeatures, frequency: float) -> bool:
 
 
 def _amounts(features: ResidualFeatures, frequency: float, harmonics: int) -> Array:
-    """Cosine and sine of each harmonic in the residual, one after the other, m.
+    """Cosine and sine of each harmonic in the residual, m: at right angles over many periods.
 
-    Over many periods they are at right angles to each other, so each is measured alone. One above
-    half the sample rate would be another's alias, and is none.
+    One above half the sample rate would be another's alias, and is none.
     """
     count, found = len(features.residual), []
     turn = np.exp(2j * np.pi * frequency * features.sample_period * np.arange(count))

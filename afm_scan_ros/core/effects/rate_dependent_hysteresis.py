@@ -108,10 +108,7 @@ def _invert(
 
 
 class RateDependentHysteresis(CausalInverse):
-    """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V).
-
-    Samples beyond the surface raise BeyondRangeError.
-    """
+    """Preisach hysteresis whose part with memory sees the drive late; state: Memory and lag (V)."""
 
     def __init__(self, surface: EverettSurface, lag: float, sample_period: float) -> None:
         self._lag = mean_over_holds(pole_of(lag), sample_period)

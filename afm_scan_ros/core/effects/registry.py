@@ -28,10 +28,7 @@ from afm_scan_ros.core.errors import InputError
 
 
 def symmetric(declared: Iterable[EffectType]) -> tuple[EffectType, ...]:
-    """Effects in alphabetical order, each confusable with all that either of the two declares.
-
-    Raises InputError where one is confusable with itself or with an effect that there is not.
-    """
+    """Effects in alphabetical order, each confusable with all that either of the two declares."""
     known = {each.name: each for each in declared}
     confusable = defaultdict(set)
     for each in known.values():
@@ -118,13 +115,9 @@ def vibration() -> EffectType:
     )
 
 
-def _discovered() -> tuple[EffectType, ...]:
-    for module in walk_packages(effects.__path__, f"{effects.__name__}."):
-        import_module(module.name)
-    return symmetric(REGISTERED.values())
-
-
-EFFECTS = _discovered()
+for _module in walk_packages(effects.__path__, f"{effects.__name__}."):
+    import_module(_module.name)
+EFFECTS = symmetric(REGISTERED.values())
 COUPLED_EFFECTS = tuple(each for each in EFFECTS if each.feedback)
 """Effects that a coupled structure may have."""
 FEEDBACK_EFFECTS = tuple(e for e in COUPLED_EFFECTS if e.feedback and not e.feedback.linear)
@@ -133,21 +126,16 @@ CATALOGUE = tuple(each for each in EFFECTS if each.forms)
 """Effects beyond the base model, of one axis or two."""
 
 
-def effect_type(name: str) -> EffectType:
-    """Return the effect of a name beyond the base model; raises InputError where there is none."""
-    return _named(name, CATALOGUE)
+def coupled_form(name: str, among: tuple[EffectType, ...] = COUPLED_EFFECTS) -> FeedbackForm:
+    """Return what an effect does to a coupled structure; raises InputError where it does not."""
+    form = effect_type(name, among).feedback
+    assert form  # noqa: S101 - by which COUPLED_EFFECTS were chosen
+    return form
 
 
 def feedback_form(name: str) -> FeedbackForm:
     """Return how an effect of a name acts in feedback; raises InputError where there is none."""
-    return coupled_form(_named(name, FEEDBACK_EFFECTS).name)
-
-
-def coupled_form(name: str) -> FeedbackForm:
-    """Return what an effect does to a coupled structure; raises InputError where it does not."""
-    form = _named(name, COUPLED_EFFECTS).feedback
-    assert form  # noqa: S101 - by which COUPLED_EFFECTS were chosen
-    return form
+    return coupled_form(name, FEEDBACK_EFFECTS)
 
 
 def changes_linearly(name: str) -> bool:
@@ -155,7 +143,8 @@ def changes_linearly(name: str) -> bool:
     return coupled_form(name).linear
 
 
-def _named(name: str, among: tuple[EffectType, ...]) -> EffectType:
+def effect_type(name: str, among: tuple[EffectType, ...] = CATALOGUE) -> EffectType:
+    """Return the effect of a name, beyond the base model; raises InputError for an unknown one."""
     for found in among:
         if found.name == name:
             return found

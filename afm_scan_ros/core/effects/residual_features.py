@@ -78,10 +78,7 @@ def prominent_lines(
 
 
 def amounts(residual: Array, *shapes: Array) -> Array:
-    """Least-squares amount of each shape (n,) in a residual (n,), an offset apart.
-
-    A shape that never changes gets 0.
-    """
+    """Least-squares amount of each shape (n,) in a residual (n,), an offset apart; or 0."""
     centred = np.stack([shape - shape.mean() for shape in shapes], axis=1)
     size = np.linalg.norm(centred, axis=0)
     size[size == 0.0] = 1.0
@@ -117,6 +114,14 @@ def likely_modes(
             ranked.append((_explained(mode, through, beyond, spacing), mode))
     ranked.sort(key=lambda each: -each[0])
     return _apart([mode for gain, mode in ranked if gain > 0.0], most)
+
+
+def modes_or_usual(
+    moved: Array, features: ResidualFeatures, usual: tuple[CandidateMode, ...]
+) -> tuple[CandidateMode, ...]:
+    """As many likely modes as there are usual ones, which stand in for those that none shows."""
+    found = likely_modes(moved, features.residual, features.sample_period, len(usual))
+    return (*found, *usual[: len(usual) - len(found)])
 
 
 def _explained(mode: CandidateMode, through: Spectrum, beyond: Spectrum, spacing: float) -> float:

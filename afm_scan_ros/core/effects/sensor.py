@@ -80,9 +80,5 @@ class SensorModel:
 
 
 def led(drive: Array) -> Array:
-    """Return a drive (V), (n, ...), a sample ahead; the last voltage is held.
-
-    It moves a displacement that is read just before the drive's updates as the drive given moves
-    one that is read after them.
-    """
+    """Return a drive (V), (n, ...), a sample ahead, for readings that follow its updates."""
     return np.concatenate([drive[1:], drive[-1:]])

@@ -38,20 +38,6 @@ STEEPEST = 0.999
 """Share of the moving drive that is less steep than what counts as its steepest."""
 
 
-class TooSteepError(SampleError):
-    """A target asks for a ``value`` (V/s) beyond the slew ``limit`` (V/s)."""
-
-    def __init__(self, sample: int, value: float, limit: float) -> None:
-        super().__init__(
-            sample,
-            f"the drive would need {value:.6g} V/s, beyond the model's slew limit of"
-            f" {limit:.6g} V/s: scan a smaller range or more slowly, or give turnaround and y step"
-            " more time",
-        )
-        self.value = value
-        self.limit = limit
-
-
 @compiled
 def _apply(end: float, law: tuple[float, float, float], block: Array, result: Array) -> float:
     """``law``: what the voltage may rise and fall in a hold, V, and the share of v it loses."""
@@ -73,11 +59,9 @@ def _apply(end: float, law: tuple[float, float, float], block: Array, result: Ar
 class SlewLimit(CausalInverse):
     """Limits of rising and falling (V/s), of which each volt takes and gives a ``rate`` (1/s).
 
-    The state is the voltage at the last hold's end (V), by which the next hold is limited.
-
-    Where the slope suffices, v still comes late by the time it takes to each update's step. The
-    inverse adds that, exact on ramps. What is too steep no inverse can reach: it raises
-    TooSteepError. Its state is the last target (V).
+    The state is the voltage at the last hold's end (V). Where the slope suffices, v still comes
+    late by the time it takes to each update's step. The inverse adds that, exact on ramps, and
+    raises SampleError for what is too steep. Its state is the last target (V).
     """
 
     def __init__(self, rising: float, falling: float, rate: float, sample_period: float) -> None:
@@ -102,25 +86,20 @@ class SlewLimit(CausalInverse):
         bad = ~(np.abs(rise) <= (1.0 + ROUNDING) * room)
         if bad.any():
             k = int(np.argmax(bad))
-            raise TooSteepError(k, float(rise[k]) / self._period, float(room[k]) / self._period)
+            raise SampleError(
+                k,
+                f"the drive would need {rise[k] / self._period:.6g} V/s, beyond the model's slew"
+                f" limit of {room[k] / self._period:.6g} V/s: scan a smaller range or more slowly,"
+                " or give turnaround and y step more time",
+            )
         last = float(block[-1]) if len(block) else state
         return last, block + 0.5 * rise * np.abs(rise) / room
 
 
 def insert(chain: Chain, values: Array) -> Chain:
-    """Limit the slope of the drive, in V/s."""
-    (slope,) = values
-    return insert_resistive(chain, np.array([slope, slope, 0.0]))
-
-
-def insert_uneven(chain: Chain, values: Array) -> Chain:
-    """Limit how fast the drive rises and how fast it falls, in V/s."""
-    return insert_resistive(chain, np.array([*values, 0.0]))
-
-
-def insert_resistive(chain: Chain, values: Array) -> Chain:
-    """Limit both, each less the nearer the voltage is to its supply, by a rate in 1/s."""
-    return chain.with_drive(Element(SlewLimit, tuple(values)))
+    """Limit the drive's slope (V/s), or rise and fall apart, or these and their rate (1/s)."""
+    rising, falling, rate = (*values, 0.0)[:3] if len(values) > 1 else (*values, *values, 0.0)
+    return chain.with_drive(Element(SlewLimit, (rising, falling, rate)))
 
 
 def starts(features: ResidualFeatures) -> Iterator[tuple[float]]:
@@ -172,7 +151,7 @@ def slew_limit() -> EffectType:
                 "uneven",
                 ("drive",),
                 (RISING, FALLING),
-                insert_uneven,
+                insert,
                 starts_uneven,
                 example=(2e3, 3e3),
                 refines="",
@@ -181,7 +160,7 @@ def slew_limit() -> EffectType:
                 "resistive",
                 ("drive",),
                 (RISING, FALLING, RATE),
-                insert_resistive,
+                insert,
                 starts_resistive,
                 example=(2e3, 3e3, 20.0),
                 refines="",

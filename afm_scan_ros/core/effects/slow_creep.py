@@ -20,7 +20,7 @@ import numpy as np
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.compiled import compiled, inlined
-from afm_scan_ros.core.effects.base import CausalInverse, Element
+from afm_scan_ros.core.effects.base import Element, Recursion
 from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType, register
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, amounts
@@ -63,11 +63,8 @@ def _run(
     return z
 
 
-class NortonCreep(CausalInverse):
-    """Creep by a power of its stress; the state is z (m).
-
-    The inverse solves each step of the discrete system for its input, so it is exact.
-    """
+class NortonCreep(Recursion):
+    """Creep by a power of its stress, with its exact inverse; the state is z (m)."""
 
     def __init__(
         self, gain: float, time_constant: float, power: float, unit: float, period: float
@@ -78,15 +75,10 @@ class NortonCreep(CausalInverse):
         """Nothing has crept."""
         return 0.0
 
-    def apply(self, state: float, block: Array) -> tuple[float, Array]:
-        """Displacement with what has crept, for displacement without, both (n,) in m."""
+    def run(self, state: float, block: Array, direction: float) -> tuple[float, Array]:
+        """What has crept, and displacement (m) with or without it."""
         result = np.empty(len(block))
-        return _run(state, self._law, block, 1.0, result), result
-
-    def invert(self, state: float, block: Array) -> tuple[float, Array]:
-        """Displacement without what creeps that gives ``block`` with it, both (n,) in m."""
-        result = np.empty(len(block))
-        return _run(state, self._law, block, -1.0, result), result
+        return _run(state, self._law, block, direction, result), result
 
 
 def insert(chain: Chain, values: Array) -> Chain:

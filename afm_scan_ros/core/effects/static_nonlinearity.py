@@ -47,6 +47,7 @@ QUADRATIC_V = EffectParameter("quadratic", "1/V", -0.04, 0.04, 1e-6)
 CUBIC_V = EffectParameter("cubic", "1/V2", -0.012, 0.02, 1e-7)
 QUINTIC_V = EffectParameter("quintic", "1/V4", -1.6e-3, 1.6e-3, 1e-8)
 SENSOR = {QUADRATIC: 1e3, CUBIC: 1e7}
+ODD_V = {CUBIC_V: -4e-3, QUINTIC_V: 2e-5}
 POWERS = {"quadratic": 2, "cubic": 3, "quartic": 4, "quintic": 5}
 
 
@@ -63,11 +64,7 @@ def _bend(coefficients: Array, reach: float, block: Array, bent: Array, slope: A
 
 @frozen
 class StaticNonlinearity(StatelessEffect):
-    """A rising polynomial, with its inverse by Newton's method.
-
-    ``coefficients`` are those of x₀⁰, x₀¹ and on. Raises InputError where it does not rise
-    everywhere within the ``reach``, m or V.
-    """
+    """A polynomial from x₀⁰ on; InputError unless it rises within its ``reach`` (m or V)."""
 
     coefficients: tuple[float, ...] = field(converter=floats)
     reach: float = REACH
@@ -95,10 +92,7 @@ class StaticNonlinearity(StatelessEffect):
         return self._bend(inputs)[0]
 
     def input(self, outputs: Array) -> Array:
-        """Straight displacement x₀ (m) that gives x (m), both (n,); or the same of volts.
-
-        Raises SampleError where Newton's method has not converged, as for a target that is NaN.
-        """
+        """Straight displacement for x, or volts, (n,); SampleError unless Newton has converged."""
         found = solved(self._bend, self._straight, self._bent, outputs)
         missed = ~(np.abs(self._bend(found)[0] - outputs) <= EXACT * self.reach)
         if missed.any():
@@ -127,51 +121,35 @@ Terms = dict[EffectParameter, float]
 """Coefficients of a polynomial, with values of a size that a scanner may show."""
 
 
-def form(kind: str, text: str, terms: Terms) -> EffectForm:
+def form(kind: str, text: str, terms: Terms, place: str = "output") -> EffectForm:
     """Form of which the polynomial has these terms beyond the first."""
-    parameters, refines = tuple(terms), "" if kind else None
-
-    def insert(chain: Chain, values: Array) -> Chain:
-        """Bend the output."""
-        return chain.with_output(
-            StaticNonlinearity(polynomial(parameters, values), REACH * length_scale(chain.model))
-        )
-
-    def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
-        """Coefficients that the residual shows, its part along the displacement left out."""
-        yield _seen(parameters, features.residual, features.displacement)
-
-    where, example = ("output",), tuple(terms.values())
-    return EffectForm(
-        kind, where, parameters, insert, starts, example=example, text=text, refines=refines
-    )
-
-
-def form_of_drive(kind: str, text: str, terms: Terms) -> EffectForm:
-    """Form of which the polynomial bends the drive."""
     parameters = tuple(terms)
 
     def insert(chain: Chain, values: Array) -> Chain:
-        """Bend the drive."""
-        return chain.with_drive(
-            StaticNonlinearity(polynomial(parameters, values), REACH_V * voltage_scale(chain.model))
-        )
+        """Bend the output, or the drive."""
+        coefficients = polynomial(parameters, values)
+        if place == "drive":
+            reach = REACH_V * voltage_scale(chain.model)
+            return chain.with_drive(StaticNonlinearity(coefficients, reach))
+        reach = REACH * length_scale(chain.model)
+        return chain.with_output(StaticNonlinearity(coefficients, reach))
 
     def starts(features: ResidualFeatures) -> Iterator[tuple[float, ...]]:
-        """Coefficients that the residual shows, by the gain of the record as a whole."""
-        moved = np.std(features.displacement)
-        volts = np.std(features.drive) / moved * features.residual if moved else features.residual
-        yield _seen(parameters, volts, features.drive)
+        """Coefficients that the residual shows, its part along the displacement left out.
 
-    where, example = ("drive",), tuple(terms.values())
+        In volts it is the residual by the gain of the record as a whole.
+        """
+        x, residual = features.displacement, features.residual
+        if place == "drive":
+            moved, x = np.std(x), features.drive
+            residual = np.std(x) / moved * residual if moved else residual
+        _, *found = amounts(residual, x, *(x ** POWERS[p.name] for p in parameters))
+        yield tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
+
+    example, refines = tuple(terms.values()), "" if kind else None
     return EffectForm(
-        kind, where, parameters, insert, starts, example=example, text=text, refines=""
+        kind, (place,), parameters, insert, starts, example=example, text=text, refines=refines
     )
-
-
-def _seen(parameters: Sequence[EffectParameter], residual: Array, x: Array) -> tuple[float, ...]:
-    _, *found = amounts(residual, x, *(x ** POWERS[p.name] for p in parameters))
-    return tuple(p.nearest(each) for p, each in zip(parameters, found, strict=True))
 
 
 @frozen
@@ -208,10 +186,8 @@ def static_nonlinearity() -> EffectType:
             form("odd_quintic", "of the sensor, odd quintic", {CUBIC: 1e8, QUINTIC: 1e17}),
             form("quartic", "of the sensor, quartic", {**SENSOR, QUARTIC: 1e11}),
             form("quintic", "of the sensor, quintic", {**SENSOR, QUARTIC: 1e11, QUINTIC: 3e15}),
-            form_of_drive("drive", "of the drive", {QUADRATIC_V: 0.01, CUBIC_V: -2e-3}),
-            form_of_drive(
-                "drive_odd_quintic", "of the drive, odd quintic", {CUBIC_V: -4e-3, QUINTIC_V: 2e-5}
-            ),
+            form("drive", "of the drive", {QUADRATIC_V: 0.01, CUBIC_V: -2e-3}, "drive"),
+            form("drive_odd_quintic", "of the drive, odd quintic", ODD_V, "drive"),
         ),
         feedback=FeedbackForm((), lambda _: (), lambda actuators, _: (Powers(actuators),)),
     )

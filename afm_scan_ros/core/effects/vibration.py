@@ -14,15 +14,8 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 from scipy.linalg import companion, expm
 
+from afm_scan_ros.core.effects import optimal_inverse as optimal
 from afm_scan_ros.core.effects.lti import SampledSystem
-from afm_scan_ros.core.effects.optimal_inverse import (
-    Kernel,
-    MultipliedWeight,
-    OptimalInverse,
-    RelativeWeight,
-    Weight,
-    optimal_kernel,
-)
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array, floats
 
@@ -74,11 +67,7 @@ class VibrationModel:
 
     @cached_property
     def resonant_pole(self) -> complex | None:
-        """Pole (rad/s) of the resonance that rises highest, None where there is no resonance.
-
-        It is the stage's own: a light structure on it, or a broad pair of poles, may lie lower in
-        frequency.
-        """
+        """Pole (rad/s) of the resonance that rises highest: the stage's own. None without one."""
         poles = np.roots(self.denominator)
         poles = poles[(poles.imag > 0.0) & (-poles.real < OSCILLATES * np.abs(poles))]
         if not poles.size:
@@ -138,11 +127,7 @@ scanner lies ahead of it, 1e-11 on the default plant."""
 
 @lru_cache(maxsize=64)
 def held(model: VibrationModel, sample_period: float) -> SampledSystem:
-    """Sample G behind a zero-order hold, exactly.
-
-    Time is first scaled by the poles' geometric mean: the paper's coefficients span 14 decades,
-    the scaled ones one. The last systems are kept, as a fit comes back to them.
-    """
+    """Sample G behind a zero-order hold, exactly; a fit asks for the last systems again."""
     whole, part = divmod(model.delay / sample_period, 1.0)
     a, late, c = _discrete(model, sample_period)
     if part == 0.0:
@@ -172,44 +157,39 @@ def _discrete(model: VibrationModel, period: float) -> tuple[Array, Array, Array
 class Vibration:
     """Vibration of one axis; the state is that of the sampled system, then the inputs delayed.
 
-    The inverse is the optimal one, designed when first asked for; what it declares is the
-    modified trajectory of the paper's Eq. 22, exact at rest. Its ``preview`` (s) is as long as it
-    needs where None. ``before`` is the vibration that the weight was chosen for, where another one
-    multiplies it.
+    The inverse is the optimal one, exact at rest, its ``preview`` (s) as long as it needs if None.
+    ``before`` is the vibration that the weight was chosen for, where another one multiplies it.
     """
 
     def __init__(
         self,
         model: VibrationModel,
         sample_period: float,
-        weight: Weight | RelativeWeight | None = None,
+        weight: optimal.Weight | optimal.RelativeWeight | None = None,
         preview: float | None = None,
         before: VibrationModel | None = None,
     ) -> None:
         self._system = held(model, sample_period)
         self._model, self._sample_period = model, sample_period
-        self._chosen, self._given, self._before = weight or RelativeWeight(), preview, before
+        self._chosen = weight or optimal.RelativeWeight()
+        self._given, self._before = preview, before
 
     @cached_property
-    def inverse(self) -> OptimalInverse:
-        """The optimal inverse by its weight.
+    def inverse(self) -> optimal.OptimalInverse:
+        """The optimal inverse; InputError where it does not die out, or for too short a preview."""
+        kernel = optimal.optimal_kernel(self._system.response, self._weight(), self._sample_period)
+        return optimal.OptimalInverse(kernel, self._preview(kernel, self._given))
 
-        Raises InputError where its response does not die out, or where the preview given cuts off
-        what the inverse needs of the targets ahead.
-        """
-        kernel = optimal_kernel(self._system.response, self._weight(), self._sample_period)
-        return OptimalInverse(kernel, self._preview(kernel, self._given))
-
-    def _weight(self) -> Weight:
+    def _weight(self) -> optimal.Weight:
         weight, chosen_for = self._chosen, self._before or self._model
-        if isinstance(weight, RelativeWeight):
+        if isinstance(weight, optimal.RelativeWeight):
             weight = weight.at(chosen_for.natural_frequency)
         if self._before is None:
             return weight
         response, before = self._system.response, held(chosen_for, self._sample_period).response
-        return MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
+        return optimal.MultipliedWeight(weight, lambda w: np.abs(response(w) / before(w)) ** 2)
 
-    def _preview(self, kernel: Kernel, given: float | None) -> int:
+    def _preview(self, kernel: optimal.Kernel, given: float | None) -> int:
         """Return the preview, samples; refuse one (s) that is too short."""
         if given is None:
             least = round(PERIODS / (self._model.natural_frequency * self._sample_period))
@@ -248,9 +228,3 @@ class Vibration:
 
 SENSOR_SENSITIVITY = 8.0e-6
 """m per sensor volt: an assumption of this package, the paper publishes none."""
-
-VIBRATION_X = VibrationModel(
-    tuple(SENSOR_SENSITIVITY * c for c in (0.435, 3910.0, 1.21e7, 1.07e14)),
-    (1.0, 8980.0, 2.78e7, 7.38e10, 1.55e14),
-)
-"""Eq. 5."""

@@ -41,10 +41,7 @@ LARGEST_CORRECTION = 0.5
 
 @inlined
 def first_try(k: int, wanted: Array, u: float, last: float, bounds: tuple[float, float]) -> float:
-    """Return the first try for a sample: on as from ``last`` to ``u``, in proportion to what grows.
-
-    What is ``wanted`` may grow up to twice as much as it did in the sample before.
-    """
+    """Return the first try for a sample: on from ``last`` to ``u``, in proportion to ``wanted``."""
     grown = 1.0
     if k > 1 and wanted[k - 1] != wanted[k - 2]:
         grown = (wanted[k] - wanted[k - 1]) / (wanted[k - 1] - wanted[k - 2])
@@ -54,10 +51,7 @@ def first_try(k: int, wanted: Array, u: float, last: float, bounds: tuple[float,
 
 @inlined
 def halley(miss: float, slope: float, curvature: float) -> float:
-    """Return Halley's step towards a miss of zero, Newton's without a curvature.
-
-    Where the function is level the step has no end, so that ``next_try`` takes the middle.
-    """
+    """Return Halley's step towards a miss of zero, Newton's without curvature; inf where level."""
     if not slope > 0.0:
         return math.copysign(np.inf, -miss)
     step = -miss / slope
@@ -69,10 +63,7 @@ def halley(miss: float, slope: float, curvature: float) -> float:
 def next_try(
     u: float, step: float, tried: tuple[float, float], bounds: tuple[float, float]
 ) -> float:
-    """Return a step's end; where it leaves the bracket, the bracket's middle or the outer bound.
-
-    From one bound a step never leads to the other, from where it might lead back.
-    """
+    """Return a step's end; where it leaves the bracket, the bracket's middle or the outer bound."""
     there = u + step
     if tried[0] < there < tried[1]:
         return there
@@ -84,8 +75,7 @@ def next_try(
 def refuse_unsolved(solved: int, wanted: Array, found: Array) -> None:
     """Raise for the sample after those ``solved``, if any, of effective inputs ``wanted`` (V).
 
-    What was ``found`` there is the nearest within reach, which raises BeyondRangeError; or it is
-    NaN, where ROUNDS steps did not suffice, which raises SampleError.
+    BeyondRangeError where the nearest within reach was ``found``, SampleError where NaN was.
     """
     if solved == len(wanted):
         return
@@ -108,11 +98,10 @@ SMALLEST = 1.0 / 6.0  # cells, threshold of the loops within one: their centre o
 
 
 def curves(surface: EverettSurface) -> tuple[Array, Array]:
-    """Return a Preisach surface as plays, each with a curve T_r (V) of its own.
+    """Return a surface as plays: thresholds in cells (n,), and each T_r at the cells, (n, n + 1).
 
-    Returns thresholds in cells (n,), and the T_r at consecutive cells of each play (n, n + 1). T_r
-    is the sum over the diagonal of cells of the threshold r. One triangle of each cell on the main
-    diagonal has loops smaller than the grid resolves, and half of what the next diagonal has.
+    T_r is the sum over the diagonal of cells of the threshold r. One triangle of each cell on the
+    main diagonal has loops smaller than the grid resolves, and half of what the next diagonal has.
     """
     even = evenly_spaced(surface)
     falls = 2.0 * even.values
@@ -145,8 +134,7 @@ def _drawn(block: float, place: float, threshold: float) -> float:
 def _decay(pull: float, way: float, along: float, before: float, a: float) -> float:
     """e^{-|pull|/a}, where the place moved a ``way`` since the last hold, ``along`` e^{-|way|/a}.
 
-    ``before`` is the same at the end of the last hold, with the sign of its pull, or 0 where it is
-    not known. A pull that grows by the way takes a product in place of an exponential.
+    ``before`` is the same at the end of the last hold, with the sign of its pull, or 0 if unknown.
     """
     if pull * way > 0.0 and pull * before > 0.0:
         return abs(before) * along
@@ -155,10 +143,7 @@ def _decay(pull: float, way: float, along: float, before: float, a: float) -> fl
 
 @inlined
 def _remaining(pull: float, share: float, a: float, decay: float) -> tuple[float, float, float]:
-    """Remainder of a pull, of which a ``share`` remains where it is small; its two derivatives.
-
-    1 - e^{-|pull|/a} falls by the share, and ``decay`` is e^{-|pull|/a}.
-    """
+    """Remainder of a pull, and its two derivatives: 1 - e^{-|pull|/a} falls by the ``share``."""
     if a == np.inf:
         return share * pull, share, 0.0
     signed, decayed = math.copysign(a, pull), 1.0 - share + share * decay
@@ -172,8 +157,7 @@ def _held_back(
 ) -> tuple[float, float, float]:
     """Σ (T(p) - T(q)) in a hold at a place in cells, after the last; its two derivatives.
 
-    ``blocks`` are p and q before it, in cells; ``decays`` are those of the pulls after the last
-    hold, with their signs, and now.
+    ``blocks`` are p and q before it; ``decays`` those of the pulls after the last hold, and now.
     """
     (thresholds, curve), (share, _, a) = plays, law
     way = place - last
@@ -224,20 +208,6 @@ def _apply(
 
 
 @compiled
-def _follow(places: Array, thresholds: Array, law: Law, blocks: Array, result: Array) -> None:
-    """Fill the means of p and q (2, n, plays) over each hold, and move the blocks."""
-    decays, (share, _, a) = np.zeros_like(blocks), law
-    for i in range(places.size):
-        for k in range(thresholds.size):
-            drawn = _drawn(blocks[0, k], places[i], thresholds[k])
-            pull = drawn - blocks[0, k]
-            decays[1, k] = math.exp(-abs(pull) / a)
-            result[0, i, k] = drawn - _remaining(pull, share, a, decays[1, k])[0]
-            result[1, i, k] = _drawn(blocks[1, k], places[i], thresholds[k])
-        _draw(places[i], thresholds, law, blocks, decays)
-
-
-@compiled
 def _invert(
     surface: Surface,
     memory: tuple[Array, int, Array],
@@ -278,8 +248,7 @@ def _invert(
 class ViscousPlays(CausalInverse):
     """Preisach hysteresis with a film of a time constant (s); state: Memory, and p, q in cells.
 
-    Where the ``activation`` (V) is infinite the film is viscous alone. The inverse solves each
-    sample's one equation between its bounds. Samples beyond the surface raise BeyondRangeError.
+    Where the ``activation`` (V) is infinite the film is viscous alone.
     """
 
     def __init__(
@@ -305,16 +274,6 @@ class ViscousPlays(CausalInverse):
         blocks, places = state[1].copy(), self._place(np.append(state[0].now[INPUT], block))
         _apply(places[0], self._plays, self._law, blocks, places[1:], result)
         return (memory, blocks), result
-
-    def followed(self, block: Array) -> Array:
-        """Means of p and q over each hold (2, n, plays), in cells, for inputs u (V) from rest on.
-
-        They follow from the thresholds alone, whatever the curves.
-        """
-        blocks = self.at_rest()[1]
-        result = np.empty((2, len(block), blocks.shape[1]))
-        _follow(self._place(block), self._plays[0], self._law, blocks, result)
-        return result
 
     def invert(self, state: State, block: Array) -> tuple[State, Array]:
         """Inputs u (V) that give a block of effective inputs F (V), both (n,)."""

@@ -2,7 +2,7 @@
 
 from attrs import frozen
 
-from afm_scan_ros.core.settings import setting
+from afm_scan_ros.core.types import setting
 
 
 @frozen

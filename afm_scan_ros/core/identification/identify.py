@@ -27,7 +27,7 @@ from afm_scan_ros.core.identification.validation import (
 )
 from afm_scan_ros.core.intersample import HELD
 from afm_scan_ros.core.model import AxisModel, EffectStatus, ScannerModel, Status
-from afm_scan_ros.core.prediction_error import apart, discrepancy
+from afm_scan_ros.core.prediction import apart, discrepancy
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread

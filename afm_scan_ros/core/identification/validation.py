@@ -22,14 +22,13 @@ from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis.discrepancy import places_moved
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.extension import extended_axis
 from afm_scan_ros.core.fit.model_of_fit import lost_by
 from afm_scan_ros.core.fit.noise import noise_of
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.records.recording import Misfit, misfit
 from afm_scan_ros.core.intersample import held_voltages, moved_by
 from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, band_edges
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart, extended_axis
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.spread import Spread

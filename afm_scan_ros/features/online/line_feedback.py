@@ -20,7 +20,7 @@ import numpy as np
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.streams import DRIVE, ErrorLines, end
+from afm_scan_ros.core.streams import DRIVE, LineErrors, end
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds
 from afm_scan_ros.core.types import Array, Trace
 from afm_scan_ros.features.online import line_correction
@@ -75,7 +75,7 @@ class FedBack(line_correction.LineCorrection):
         nothing = np.zeros(COEFFICIENTS)
         super().__init__(spec, delay, nothing)
         self._fit, self._range, self._latest = LineFit(spec), spec.range_x, nothing
-        self._errors = ErrorLines(phases(spec).lines, spec.samples_per_line)
+        self._errors = LineErrors(phases(spec).lines, spec.samples_per_line)
         self._extrapolation = Extrapolation(delay, COEFFICIENTS)
         self._known = self._extrapolation.at_rest()
         self._ahead = deque([nothing] * delay)  # corrections of the lines to be achieved next
@@ -98,7 +98,7 @@ class FedBack(line_correction.LineCorrection):
         """Take the next block of a topic; learn from the error of each line that it makes whole."""
         if name == DRIVE:
             return
-        for line, error in self._errors.add(name, block):
+        for line, error in self._errors.samples(name, block):
             disturbance = self._fit.coefficients(error) - self._ahead.popleft()
             self._known, ahead = self._extrapolation.step(self._known, disturbance)
             self._values[line + self.delay] = -ahead

@@ -15,7 +15,7 @@ from typing import TypeAlias
 from attrs import frozen
 
 from afm_scan_ros.core.errors import InputError, ScanError
-from afm_scan_ros.core.settings import setting
+from afm_scan_ros.core.types import setting
 from afm_scan_ros.features.view.priority import run_after
 
 WINDOW = "window"

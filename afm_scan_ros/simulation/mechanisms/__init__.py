@@ -3,11 +3,9 @@
 from importlib.metadata import entry_points
 
 from afm_scan_ros.simulation.mechanisms import (  # noqa: F401 - importing a module registers its kinds
-    amplifier,
-    elapsed,
+    electronics,
     environment,
     material,
-    sensor,
     structure,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -17,11 +15,7 @@ PLUGINS = "afm_scan_ros.mechanisms"
 
 
 def mechanism_type(kind: str) -> type[Mechanism] | None:
-    """Return the mechanism of this kind, or None where no installed package defines it.
-
-    The modules of the entry-point group ``PLUGINS`` are imported only for a kind that is not
-    known without them.
-    """
+    """Return the mechanism of a kind, of this package or of a plugin; None where there is none."""
     if kind not in Mechanism.KINDS:
         for point in entry_points(group=PLUGINS):
             point.load()

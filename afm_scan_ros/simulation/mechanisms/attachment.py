@@ -164,10 +164,7 @@ def _slopes(
 
 @frozen(eq=False)
 class Parts(Attached):
-    """Springs of ``share`` (1) altogether, which yield or slip at ``reaches`` (m).
-
-    Their own state: deflection of each, m, shape (parts,).
-    """
+    """Springs of ``share`` (1) altogether, which yield or slip at ``reaches`` (m)."""
 
     share: float
     reaches: Array
@@ -179,12 +176,7 @@ class Parts(Attached):
 
 @frozen(kw_only=True)
 class YieldingAttachment(Attachment):
-    """Several springs that yield or slip one after another, all equally stiff.
-
-    ``share`` of the axis' stiffness that the springs add, ``reaches`` (m) where each yields or
-    slips.
-    ``PARTS`` is the class of the springs.
-    """
+    """Several springs (``PARTS``), all equally stiff, that yield or slip one after another."""
 
     PARTS: ClassVar[type[Parts]]
 

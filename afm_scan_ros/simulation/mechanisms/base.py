@@ -84,10 +84,7 @@ class Insert(Mechanism):
 
 
 class Clocked(Insert):
-    """An insert that depends on time alone; state: elapsed steps, and what was drawn.
-
-    Time counts from the beginning of the scan.
-    """
+    """An insert that depends on time alone; state: elapsed steps, and what was drawn."""
 
     @abstractmethod
     def drawn(self, rng: np.random.Generator) -> Any:  # noqa: ANN401 - each its own
@@ -117,11 +114,7 @@ class Clocked(Insert):
 
 @frozen(kw_only=True)
 class Ageing(Mechanism):
-    """A mechanism that goes on from one scan to the next, which a scanner's age says.
-
-    Time counts from when the scanner was switched on. ``age`` (s) is that at the beginning of the
-    scan.
-    """
+    """A mechanism that goes on from one scan to the next; ``age`` (s) is that at its beginning."""
 
     age: float = field(default=0.0, validator=ge(0.0), metadata={"suffix": "_s", "scale": 1.0})
 

@@ -92,10 +92,7 @@ class AgedCreep(Alteration):
 
 @frozen(eq=False)
 class DraggedBank(ABC):
-    """Plays of a hysteresis that lag behind; at low speed they are the plays without a mechanism.
-
-    State: the plays' positions, V, shape (elements,).
-    """
+    """Plays of a hysteresis that lag behind, as fast as the drive is; state: their positions, V."""
 
     plays: PlayBank
 

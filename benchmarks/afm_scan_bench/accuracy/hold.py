@@ -4,10 +4,15 @@ from attrs import evolve
 
 from afm_scan_bench.scans import relative_error, spec_at
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverse, RelativeWeight, optimal_kernel
-from afm_scan_ros.core.effects.vibration import VIBRATION_X, Vibration
+from afm_scan_ros.core.effects.vibration import SENSOR_SENSITIVITY, Vibration, VibrationModel
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.report.table import Row, Table
 
+VIBRATION_X = VibrationModel(
+    tuple(SENSOR_SENSITIVITY * c for c in (0.435, 3910.0, 1.21e7, 1.07e14)),
+    (1.0, 8980.0, 2.78e7, 7.38e10, 1.55e14),
+)
+"""Eq. 5."""
 LINE_RATE = 250.0
 SAMPLE_RATES = (20e3, 100e3)
 INVERTED = {"G(s) alone": False, "G(s) behind the hold": True}

@@ -17,7 +17,7 @@ from afm_scan_bench.any_lab.scanner import DRAWN_FOR, FAMILIES, DrawnScanner, dr
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.prediction_error import apart, discrepancy
+from afm_scan_ros.core.prediction import apart, discrepancy
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.report.table import Row, Table
 

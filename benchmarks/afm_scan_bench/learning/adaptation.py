@@ -20,7 +20,7 @@ from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.features.online.adaptation import TIME_CONSTANT, Adaptation
 from afm_scan_ros.features.online.adapted_scan import AdaptedScan
 from afm_scan_ros.report.table import Row, Table
-from afm_scan_ros.simulation.mechanisms.elapsed import ChangingLoad
+from afm_scan_ros.simulation.mechanisms.environment import ChangingLoad
 from afm_scan_ros.simulation.scanner import Piezoscanner
 
 MINUTES = 10

@@ -9,8 +9,8 @@ from attrs.validators import gt, lt
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import quantity
-from afm_scan_ros.simulation.mechanisms.amplifier import Charging, follow
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.electronics import Charging, follow
 
 
 @frozen(kw_only=True)

@@ -10,8 +10,8 @@ from afm_scan_ros.core.compiled import compiled, inlined
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.simulation.axis import quantity
-from afm_scan_ros.simulation.mechanisms.amplifier import Charging
 from afm_scan_ros.simulation.mechanisms.base import Insert, Place
+from afm_scan_ros.simulation.mechanisms.electronics import Charging
 
 CERAMIC_KNEE = 2.5  # V
 

@@ -8,10 +8,9 @@ from collections.abc import Callable
 from attrs import frozen
 
 from afm_scan_ros.simulation.mechanisms import (
-    amplifier,
+    electronics,
     environment,
     material,
-    sensor,
     structure,
 )
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
@@ -64,7 +63,9 @@ def _creeping(shares: Sizes, taus: tuple[float, ...]) -> SizedEffect:
 
 
 EFFECTS = {
-    "cross_coupling_tilt": _of("cross_coupling", sensor.TiltedSensor, "angle", (3e-3, 9e-3, 30e-3)),
+    "cross_coupling_tilt": _of(
+        "cross_coupling", electronics.TiltedSensor, "angle", (3e-3, 9e-3, 30e-3)
+    ),
     "cross_coupling_mode": _of(
         "cross_coupling",
         structure.CoupledStage,
@@ -83,12 +84,12 @@ EFFECTS = {
     ),
     "input_lag": _of(
         "input_lag",
-        amplifier.LaggingAmplifier,
+        electronics.LaggingAmplifier,
         "resistance",
         (170.0, 500.0, 1700.0),
         capacitance=CAPACITANCE,
     ),
-    "delay": _of("delay", amplifier.DelayedConverter, "delay", (17e-6, 50e-6, 170e-6)),
+    "delay": _of("delay", electronics.DelayedConverter, "delay", (17e-6, 50e-6, 170e-6)),
     "rate_dependent_hysteresis": _of(
         "rate_dependent_hysteresis",
         material.ViscousBlocks,
@@ -106,14 +107,14 @@ EFFECTS = {
         "static_nonlinearity", structure.StiffeningFlexure, "length", (280e-6, 160e-6, 87e-6)
     ),
     "static_nonlinearity_sensor": _of(
-        "static_nonlinearity", sensor.TiltedPlate, "wedge", (28e-6, 44e-6, 63e-6), gap=100e-6
+        "static_nonlinearity", electronics.TiltedPlate, "wedge", (28e-6, 44e-6, 63e-6), gap=100e-6
     ),
     "backlash": _of(
         "backlash", structure.LooseJoint, "gap", (40e-9, 120e-9, 400e-9), contact_time=1e-6
     ),
     "slew_limit": _of(
         "slew_limit",
-        amplifier.LimitedAmplifier,
+        electronics.LimitedAmplifier,
         "current",
         (73e-6, 64e-6, 46e-6),
         resistance=5.0,
@@ -133,7 +134,9 @@ EFFECTS = {
     "parameter_shift_gain": _of(
         "parameter_shift", material.LostPoling, "loss", (0.0033, 0.01, 0.033)
     ),
-    "cyclic_error": _of(None, sensor.CyclicEncoder, "inequality", (0.044, 0.13, 0.42), period=8e-6),
+    "cyclic_error": _of(
+        None, electronics.CyclicEncoder, "inequality", (0.044, 0.13, 0.42), period=8e-6
+    ),
     "bow": _of(None, structure.ScannerBow, "arm", (4e-3, 1.3e-3, 0.4e-3)),
 }
 """By the names of the files in config/plants."""

@@ -8,9 +8,9 @@ from afm_scan_bench.paper.grating import GratingFigures, grating_figures
 from afm_scan_bench.paper.regrid import regrid
 from afm_scan_bench.paper.ripple import Ripple, line_path
 from afm_scan_bench.paper.scanner import PaperScan
-from afm_scan_ros.core.image_lines import LineImager, frame_of
+from afm_scan_ros.core.image_lines import Imaged, LineImager, frame_of
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.sample import Grating, Sample
+from afm_scan_ros.simulation.sample import Grating
 
 RESONANCE = 454.0
 """The scanner's first natural frequency, Hz."""
@@ -34,7 +34,7 @@ class Dust:
     y: float
     radius: float = field(validator=gt(0.0))
     peak: float = field(validator=gt(0.0))
-    below: Sample
+    below: Imaged
 
     def height(self, x: Array, y: Array) -> Array:
         """Height of what lies below, and the particle's on top."""

@@ -13,7 +13,7 @@ from attrs import evolve, frozen
 from afm_scan_bench.scans import SEED, default_model, default_plant
 from afm_scan_ros.core.model import AxisModel, InverseSettings, VibrationModel
 from afm_scan_ros.core.scan_spec import ScanSpec
-from afm_scan_ros.core.scanner import compensator
+from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import raster
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
@@ -94,7 +94,7 @@ def scaled_model(axis: str) -> AxisModel:
 
 def _drive(axis: str, target: Trace, inverses: tuple[str, ...]) -> Array:
     model = scaled_model(axis)
-    inverse = compensator(model, target.sample_period, inverses, InverseSettings())
+    inverse = chain_of(model).compensator(target.sample_period, inverses, InverseSettings())
     state, begun = inverse.invert(inverse.inverse_at_rest(), target.axis(axis))
     drive = np.concatenate((begun, inverse.finish(state)))
     return drive if "hysteresis" in inverses else drive * model.hysteresis.forward.chord

@@ -15,7 +15,7 @@ from afm_scan_bench.diagnosis.unmodelled.sets import (
 )
 from afm_scan_bench.mechanisms.sizes import ALL, PAIRS, sized
 from afm_scan_ros.core.types import AXES
-from afm_scan_ros.simulation.mechanisms import elapsed
+from afm_scan_ros.simulation.mechanisms import environment
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
 from afm_scan_ros.simulation.scanner import PlantSpec
 from helpers import mechanism_laws as laws
@@ -57,7 +57,9 @@ def test_the_step_of_integration_does_not_matter(
 def test_every_kind_is_tested() -> None:
     """Those that depend on the scanner's age are, in a file of their own."""
     tested = {each.KIND for name in ALL for each in sized(name, "large", "x")}
-    by_age = {name for name, kind in Mechanism.KINDS.items() if kind.__module__ == elapsed.__name__}
+    by_age = {
+        name for name, kind in Mechanism.KINDS.items() if kind.__module__ == environment.__name__
+    }
     assert tested | by_age == set(Mechanism.KINDS)
 
 

@@ -24,8 +24,7 @@ from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.effects.static_nonlinearity import Powers
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import power_by_band
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Tally
 
 SOFT, SLIP, SHIFT = ("amplitude_softening",), ("maxwell_slip",), ("parameter_shift",)
 SAMPLES, PERIOD, PARTS = 256, 1e-3, 4

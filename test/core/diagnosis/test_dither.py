@@ -12,8 +12,8 @@ from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import dither_plan
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
-from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter, LaggingAmplifier
 from afm_scan_ros.simulation.mechanisms.base import Mechanism
+from afm_scan_ros.simulation.mechanisms.electronics import DelayedConverter, LaggingAmplifier
 from helpers.in_process import InProcessSession, default_model, default_plant
 
 LATE = 17e-6  # s; a sample of the experiment takes 20 µs

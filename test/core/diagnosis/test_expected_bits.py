@@ -25,7 +25,7 @@ from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.simulation.mechanisms.amplifier import DelayedConverter
+from afm_scan_ros.simulation.mechanisms.electronics import DelayedConverter
 from helpers.in_process import InProcessSession, default_model, default_plant
 
 CHAIN = chain_of(default_model().x)

@@ -25,8 +25,7 @@ from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.files.plant_file import load_plant
-from afm_scan_ros.simulation.mechanisms.amplifier import LimitedAmplifier
-from afm_scan_ros.simulation.mechanisms.sensor import TiltedSensor
+from afm_scan_ros.simulation.mechanisms.electronics import LimitedAmplifier, TiltedSensor
 from afm_scan_ros.simulation.mechanisms.structure import RidingMass
 from helpers.in_process import ALL, default_model, default_plant, scan
 

@@ -21,8 +21,7 @@ from afm_scan_ros.core.diagnosis.search import ModelSearch, Selection
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, log_density
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Array
+from afm_scan_ros.core.types import Array, Tally
 
 BOTH = ("extra_resonance", "rate_dependent_hysteresis")
 INSTEAD = ("parameter_shift", "delay")

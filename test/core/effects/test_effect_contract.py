@@ -17,7 +17,7 @@ from afm_scan_ros.core.effects.hysteresis.duhem import Duhem
 from afm_scan_ros.core.effects.hysteresis.preisach import DirectInverse, Preisach
 from afm_scan_ros.core.effects.vibration import Vibration
 from afm_scan_ros.core.model import InverseSettings
-from afm_scan_ros.core.scanner import compensator, forward
+from afm_scan_ros.core.scanner import chain_of, forward
 
 PERIOD = 5e-5
 AXIS = paper.axis()
@@ -35,7 +35,7 @@ class Case:
 
 
 def _case_of_compensator(*inverses: str) -> Case:
-    chain = compensator(AXIS, PERIOD, inverses, InverseSettings())
+    chain = chain_of(AXIS).compensator(PERIOD, inverses, InverseSettings())
     return Case(chain, 4.0, 5.0 * STATIC, 1e-3)
 
 

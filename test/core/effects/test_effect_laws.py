@@ -17,7 +17,7 @@ from afm_scan_ros.core.effects.effect_type import PLACES
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import INVERSES, Added, InverseSettings, ScannerModel
-from afm_scan_ros.core.scanner import Coupling, compensator, forward, predict
+from afm_scan_ros.core.scanner import Coupling, chain_of, forward, predict
 from afm_scan_ros.core.types import AXES, Trace
 
 PERIOD = 5e-5
@@ -54,7 +54,7 @@ def extended(name: str, kind: str, values: Sequence[float]) -> ScannerModel:
 def compensating(name: str = "", kind: str = "") -> Cascade:
     """Compensator of an axis with an effect, or without; its design takes long."""
     axis = extended(name, kind, example(name, kind)).x if name else BASE.x
-    return compensator(axis, PERIOD, INVERSES, DESIGN)
+    return chain_of(axis).compensator(PERIOD, INVERSES, DESIGN)
 
 
 def drive(seed: int, samples: int) -> Trace:

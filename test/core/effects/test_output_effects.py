@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from afm_scan_ros.core.effects import base
 from afm_scan_ros.core.effects.backlash import STEEPNESS, Backlash
-from afm_scan_ros.core.effects.drift import Drift, settles, slows
+from afm_scan_ros.core.effects.drift import Drift, settles
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance, starts_of_comb
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.static_nonlinearity import REACH, StaticNonlinearity
@@ -126,7 +126,7 @@ def test_drift_begins_at_its_rate_and_ends_at_rest() -> None:
 
 def test_a_drift_that_slows_down_moves_alike_in_every_decade() -> None:
     """Golden: 1 nm/s at first, then ln 10 of 10 nm from 100 settling times to 1000."""
-    effect = Drift(slows, 1e-9, 10.0, 0.1)
+    effect = Drift(np.log1p, 1e-9, 10.0, 0.1)
     moved = effect.apply(effect.at_rest(), np.zeros(100_001))[1]
     assert moved[1] == pytest.approx(1e-10, rel=0.01)
     assert moved[-1] - moved[10_000] == pytest.approx(1e-8 * np.log(10.0), rel=0.01)

@@ -11,7 +11,7 @@ from afm_scan_ros.core.fit.parameters import SEARCHED
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import Status
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import GAIN, PERIOD, SETTINGS, levels, of_plays_alone, signals
 

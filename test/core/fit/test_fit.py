@@ -22,7 +22,7 @@ from afm_scan_ros.core.fit.tones import free_tones
 from afm_scan_ros.core.fit.uncertainty import covariance
 from afm_scan_ros.core.identification.validation import spread_of
 from afm_scan_ros.core.model import ScannerModel
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array
 from helpers.fit_cases import (

@@ -21,7 +21,7 @@ from afm_scan_ros.core.identification.findings import (
 )
 from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.core.model import ParameterInterval, Status
-from afm_scan_ros.core.prediction_error import apart, discrepancy
+from afm_scan_ros.core.prediction import apart, discrepancy
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import forward
 from afm_scan_ros.core.types import Array

@@ -12,7 +12,7 @@ from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.fit.told import Knowledge
 from afm_scan_ros.core.identification.validation import Validation, spread_of, validate_from
 from afm_scan_ros.core.model import AxisModel, ScannerModel
-from afm_scan_ros.core.prediction_error import apart
+from afm_scan_ros.core.prediction import apart
 from helpers.fit_cases import GAIN, LIMIT, PERIOD, levels, of_plays_alone
 
 NOISE = 1e-9

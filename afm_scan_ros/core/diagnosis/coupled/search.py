@@ -24,8 +24,7 @@ from afm_scan_ros.core.identification.state_space.fit import fit_state_space, re
 from afm_scan_ros.core.identification.state_space.identify import Teaching, actuators_of
 from afm_scan_ros.core.identification.state_space.model import StateSpaceModel
 from afm_scan_ros.core.identification.state_space.spectra import joined
-from afm_scan_ros.core.tally import Tally
-from afm_scan_ros.core.types import Array, ProgressCallback
+from afm_scan_ros.core.types import Array, ProgressCallback, Tally
 
 MOST = 2
 """Effects of a set."""

@@ -153,10 +153,7 @@ def by_input(tables: Array, curve: Centre, grid: Grid, now: Array, block: Array)
 def _solved(
     table: Array, curve: Centre, grid: Grid, at: tuple[float, float], stop: float, wanted: float
 ) -> tuple[float, float, float]:
-    """Input on the branch from ``at`` (input, w) to a stop, its w, and what remains of ``wanted``.
-
-    Newton's method between bounds that close in: the output grows all the way.
-    """
+    """Input on the branch from ``at`` towards a stop, its w, and what remains of ``wanted``."""
     u, w = at
     height, slope = centre(curve, grid, u)
     way, near, far = np.sign(stop - u), u, stop
@@ -184,10 +181,7 @@ def _solved(
 def by_output(
     tables: Array, curve: Centre, grid: Grid, now: Array, block: Array, result: Array
 ) -> tuple[int, float]:
-    """Inputs (V) for a block of outputs (V), both (n,); ``now`` (input, w) is moved on.
-
-    Returned are how many samples were done, and the output at the limit that the next one passes.
-    """
+    """Inputs (V) for outputs (V), (n,): how many are done, and the limit that the next passes."""
     u, w = now
     limits = grid[0], grid[0] + grid[1] * (tables.shape[1] - 3)
     exact = SOLVED * (curve[1][-1] - curve[1][0])
@@ -211,10 +205,7 @@ def by_output(
 def _slope_and_bend(
     table: Array, grid: Grid, at: tuple[float, float], work: Work, stage: int
 ) -> tuple[float, float]:
-    """Return ``change`` at a point (u, w) and its derivative by w; keep the splines there.
-
-    Beyond the cells of w the slope does not change.
-    """
+    """Return ``change`` at (u, w) and its derivative by w, 0 beyond the cells; keep the splines."""
     (u, w), (places, splines) = at, work
     cells = table.shape[1] - 3
     i, t = _place(u, grid[0], grid[1], table.shape[0] - 3)
@@ -240,8 +231,7 @@ def _grow(
 ) -> float:
     """Take one ``step`` from (u, w) to the input ``far``, and its derivatives by the tables.
 
-    They are those of the step as it is computed: the shares of its four slopes in w at the end,
-    each with what it does through those after it, from the last one back.
+    The shares of its four slopes in w at the end, each with what it does through those after it.
     """
     table, (u, w, far) = tables[side], way
     length = far - u
@@ -262,10 +252,7 @@ def _grow(
 def _spread(
     grown: Scaled, growth: float, shares: Weights, side: int, shape: tuple[int, int], work: Work
 ) -> None:
-    """Let derivatives grow, and add shares of the splines at four points to those of one side.
-
-    Their scale grows in place of all of them. What is added is no part of the samples before.
-    """
+    """Let derivatives grow, by their scale, and add shares of the splines at four points."""
     derivatives, rest, scales = grown
     places, splines = work
     scales[0] *= growth
@@ -299,9 +286,8 @@ def sensitivities(
 ) -> tuple[Array, Array]:
     """Values of w along a path of inputs, (n,), and their derivatives by the tables, (n, values).
 
-    ``now`` (input, w) and its ``derivatives`` (values,) are moved on.
-    Where ``known`` (n,) is a number, the path goes on from it in place of w: the next value is then
-    a prediction by one step alone.
+    ``now`` (input, w) and its ``derivatives`` are moved on. Where ``known`` (n,) is a number, the
+    path goes on from it in place of w: the next value is a prediction by one step alone.
     """
     jacobian, values = np.empty((path.size, tables.size)), np.empty(path.size)
     grown = derivatives, np.zeros(tables.size), np.array([1.0, 0.0])
@@ -320,10 +306,7 @@ def sensitivities(
 def mean_sensitivities(
     tables: Array, grid: Grid, now: Array, derivatives: Array, path: Array, edges: NDArray[np.intp]
 ) -> Array:
-    """Derivatives of w by the tables, as ``sensitivities`` gives, averaged between edges of a path.
-
-    The shape is (edges - 1, values).
-    """
+    """Derivatives of ``sensitivities`` averaged between edges of a path: (edges - 1, values)."""
     mean, scales = np.zeros((edges.size - 1, tables.size)), np.array([1.0, 0.0])
     work = np.empty((4, 2), np.int64), np.empty((4, 2, 4))
     for k in range(mean.shape[0]):

@@ -11,9 +11,6 @@ Source: B. D. Coleman and M. L. Hodgdon, Int. J. Engineering Science 24 (1986) 8
 Ismail, F. Ikhouane and J. Rodellar, Arch. Comput. Methods Eng. 16 (2009) 161, Eqs. 1 to 3.
 """
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from attrs import evolve, field, frozen
 
@@ -27,18 +24,10 @@ from afm_scan_ros.core.effects.hysteresis.branches import (
 )
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError, refuse_beyond
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.types import Array, by_value
+from afm_scan_ros.core.types import Array, by_value, contiguous, pair
 
 SMALLEST = 4
 """Coefficients of a cubic spline of one cell."""
-
-
-def _ends(values: Sequence[float]) -> tuple[float, float]:
-    return float(values[0]), float(values[1])
-
-
-def _array(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for an array
-    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 @frozen
@@ -58,10 +47,10 @@ class DuhemSlopes:
     upper: float = field(converter=float)
     offset: float = field(converter=float)
     rest: float = field(converter=float)
-    widths: tuple[float, float] = field(converter=_ends)
-    centre: Array = field(converter=_array, eq=by_value)
-    rising: Array = field(converter=_array, eq=by_value)
-    falling: Array = field(converter=_array, eq=by_value)
+    widths: tuple[float, float] = field(converter=pair)
+    centre: Array = field(converter=contiguous, eq=by_value)
+    rising: Array = field(converter=contiguous, eq=by_value)
+    falling: Array = field(converter=contiguous, eq=by_value)
 
     def __attrs_post_init__(self) -> None:
         shape = self.rising.shape
@@ -124,10 +113,7 @@ class DuhemSlopes:
         return float(self.heights(np.array([u]))[0])
 
     def with_share(self, share: float) -> "DuhemSlopes":
-        """Return the operator whose outputs lie ``share`` times as far from the centre curve.
-
-        Raises InputError where that has no inverse.
-        """
+        """Return the operator ``share`` times as far from its centre, or raise InputError."""
         if share == 0.0:
             flat = np.repeat(self.centre[:, np.newaxis], self.rising.shape[1], axis=1)
             return evolve(self, rising=flat, falling=flat, rest=self.height(0.0))
@@ -143,9 +129,8 @@ class DuhemSlopes:
 class Duhem(CausalInverse):
     """Hysteresis of one axis, with its exact inverse.
 
-    The state of either, shape (2,), is the last input (V) and the distance (V) of the output from
-    the centre curve. Inputs beyond the identified range, and outputs that need such inputs, raise
-    BeyondRangeError.
+    The state of either, shape (2,), is the last input (V) and the output's distance (V) from the
+    centre curve. What is or needs an input beyond the identified range raises BeyondRangeError.
     """
 
     def __init__(self, slopes: DuhemSlopes) -> None:

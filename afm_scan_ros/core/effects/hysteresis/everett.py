@@ -1,14 +1,12 @@
 """The Everett surface: half the change of output along each first-order reversal curve."""
 
-from typing import Any
-
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.converters import optional
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.errors import InputError, SampleError
-from afm_scan_ros.core.types import Array, by_value
+from afm_scan_ros.core.types import Array, by_value, contiguous, pair
 
 ROUNDING = 1e-12
 """Share of a range by which sums of some thousand terms may be rounded beyond it."""
@@ -26,15 +24,6 @@ class BeyondRangeError(SampleError):
         )
         self.value = value
         self.limit = limit
-
-
-def _matrix(values: Any) -> Array:  # noqa: ANN401 - whatever numpy takes for a matrix
-    return np.ascontiguousarray(values, dtype=np.float64)
-
-
-def _pair(values: Any) -> tuple[float, float]:  # noqa: ANN401 - whatever holds two numbers
-    lower, upper = values
-    return float(lower), float(upper)
 
 
 @frozen
@@ -58,11 +47,11 @@ class EverettSurface:
 
     lower: float = field(converter=float)
     upper: float = field(converter=float)
-    values: Array = field(converter=_matrix, eq=by_value)
+    values: Array = field(converter=contiguous, eq=by_value)
     offset: float = field(converter=float)
     bias: float | None = field(default=None, converter=optional(float))
-    uneven: Array | None = field(default=None, converter=optional(_matrix), eq=by_value)
-    within: tuple[float, float] | None = field(default=None, converter=optional(_pair))
+    uneven: Array | None = field(default=None, converter=optional(contiguous), eq=by_value)
+    within: tuple[float, float] | None = field(default=None, converter=optional(pair))
 
     def __attrs_post_init__(self) -> None:
         n = len(self.values)
@@ -139,10 +128,7 @@ class EverettSurface:
         return (self.output_upper - self.output_lower) / (self.upper - self.lower)
 
     def with_share(self, share: float) -> "EverettSurface":
-        """Return the surface of R + share H, of ``reversible``.
-
-        Raises InputError where that has no inverse.
-        """
+        """Return the surface of R + share H; raises InputError where that has no inverse."""
         levels = reversible(self)
         without = np.tril(0.5 * (levels[:, np.newaxis] - levels))
         values = share * self.values + (1.0 - share) * without
@@ -153,9 +139,8 @@ class EverettSurface:
 def grown(values: Array, levels: Array, least: float) -> tuple[Array, float]:
     """Return E that grows everywhere by a ``least`` slope (1), near ``values`` on ``levels`` (V).
 
-    Where the values do not grow, they become the middle between the least surface above them that
-    does and the greatest below. The second result is the share of a surface without hysteresis that
-    is mixed in; it is 0 where the values grow so far themselves.
+    That is the middle between the least surface above them that grows and the greatest below. The
+    second result is the share of a surface without hysteresis that is mixed in.
     """
     inside, half = np.tri(len(levels), dtype=bool), 0.5 * (levels[1] - levels[0])
     lowest = float(min(map(np.min, _rises(values, inside)))) / half
@@ -173,10 +158,7 @@ def grown(values: Array, levels: Array, least: float) -> tuple[Array, float]:
 
 
 def grown_beyond(values: Array, inside: slice, least: float) -> Array:
-    """Return E (n, n) that grows from level to level by ``least`` (V), also beyond those inside.
-
-    Inside, where it grows, it stays as it is.
-    """
+    """Return E (n, n) that grows by ``least`` (V) from level to level, also beyond those inside."""
     result, floor = values.copy(), least * np.arange(len(values))
     for j in range(inside.start - 1, -1, -1):
         column = np.maximum(result[j + 1 :, j], result[j + 1 :, j + 1] + least)
@@ -223,11 +205,10 @@ def refuse_beyond(block: Array, lower: float, upper: float) -> None:
 
 
 def reversible(surface: EverettSurface) -> Array:
-    """Return the reversible part R (V) at the levels of the surface, shape (n,).
+    """Return the reversible part R (V) of F = R(u) + H at the levels of the surface, shape (n,).
 
-    The hysteresis is F = R(u) + H. R has the slope of the smallest loops at u, where each loop is
-    all but closed (Mayergoyz' reversible component). H has all memory, and equal values of
-    opposite sign at both saturations.
+    R has the slope of the smallest loops at u, each all but closed (Mayergoyz' reversible
+    component). H has all memory, and equal values of opposite sign at both saturations.
     """
     rise = 2.0 * np.diag(surface.values, -1)
     levels = np.concatenate(([0.0], np.cumsum(rise)))

@@ -120,11 +120,10 @@ AT_ONCE = 2**15
 
 @frozen(eq=False)
 class Memory:
-    """What the material remembers: the extrema not yet wiped out, and the present.
+    """What the material remembers: the extrema not yet wiped out, and the present pair, ``now``.
 
-    ``pages``, of shape (2, …) each, the oldest first, hold inputs and outputs (V); the first is a
-    minimum (the negative saturation) and they alternate. Every page but the last holds ``PAGE``
-    of them. ``now``, shape (2,), is the last sample's pair.
+    ``pages`` (2, …), the oldest first, hold inputs and outputs (V), a minimum first, the negative
+    saturation. Every page but the last holds ``PAGE`` of them.
     """
 
     pages: tuple[Array, ...]
@@ -145,12 +144,10 @@ def _paged(stack: Array) -> tuple[Array, ...]:
 
 
 def depolarising(lower: float, upper: float, bias: float | None = None) -> Array:
-    """Inputs at the extrema of an oscillation that decays from both limits to zero.
+    """Inputs at the extrema of an oscillation that decays from both limits to zero, or the nearer.
 
-    Where zero lies beyond a limit, it decays to that limit. With a ``bias`` (V), that of an
-    EverettSurface, each swing is shorter than the last by as much: the corners of the staircase
-    that they leave in the Preisach plane lie to either side of one line, alpha = -beta but for the
-    bias. Without one, each pair of swings is shorter than the last.
+    With the ``bias`` (V) of an EverettSurface, each swing is shorter than the last by as much.
+    Without one, each pair of swings is shorter than the last.
     """
     if bias is None:
         decay = 1.0 - np.arange(DEPOLARISING_CYCLES + 1) / DEPOLARISING_CYCLES
@@ -219,10 +216,8 @@ class Preisach(CausalInverse):
 class DirectInverse(CausalInverse):
     """Hysteresis of one axis whose inverse is a Preisach model; the state is that one's Memory.
 
-    This is the paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17). It is identified
-    from output to input, with the surface U(alpha, beta) over the effective input F.
-    ``surface`` is over F (V); its output is u (V), and its bias is of u. Samples beyond it raise
-    BeyondRangeError.
+    The paper's own inverse (Croft, Shed and Devasia 2001, Eqs. 11 to 17), identified from output to
+    input: ``surface`` is over F (V), its output is u (V). Samples beyond raise BeyondRangeError.
     """
 
     def __init__(self, surface: EverettSurface) -> None:

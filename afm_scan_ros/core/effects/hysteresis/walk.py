@@ -90,11 +90,7 @@ def remember(
 def _line(
     surface: Surface, memory: tuple[Array, int], here: float, given: int, target: float
 ) -> Line:
-    """Straight piece of the branch on which ``target`` lies.
-
-    The search over cells for an output starts at the input ``here``, so that its cost a sample is
-    constant for a motion of bounded speed.
-    """
+    """Straight piece of the branch on which ``target`` lies, sought from the input ``here`` on."""
     tables, axes, bins = surface
     stack, depth = memory
     # A fall is seen in the mirror: its positions are the inputs' negatives.
@@ -121,10 +117,7 @@ def _line(
 def try_input(
     surface: Surface, memory: tuple[Array, int], now: Array, target: float
 ) -> tuple[int, float, float]:
-    """Depth after an input, the output there and dF/du onwards; whatever is remembered stays.
-
-    ``memory`` is as of ``walk``: what is written lies above its depth.
-    """
+    """Depth after an input, output and dF/du there; only what lies above the depth is written."""
     stack, depth = memory
     depth = remember(stack, depth, now, INPUT, target)
     u, f, _, ahead, _ = _line(surface, (stack, depth), now[INPUT], INPUT, target)
@@ -137,9 +130,8 @@ def _follow(
 ) -> tuple[int, float, float]:
     """Go along a line from sample ``k``, which lies on it, to the first sample that does not.
 
-    Returned are that sample's index and the farthest point (given, other). Back from there the
-    motion is on a branch of its own; but within one cell that branch is straight too, the same
-    down and up, and forgotten where it ends: so it needs no memory.
+    Returned are that sample's index and the farthest point (given, other). Back from there, within
+    one cell, the branch is straight too, the same down and up: so it needs no memory.
     """
     u, f, end, ahead, back = line
     begin, x0, y0 = u, u, f
@@ -172,10 +164,9 @@ def walk(
 ) -> tuple[int, int]:
     """Outputs for a block of inputs, or inputs for one of outputs: whichever is ``given``.
 
-    ``limits`` bound the block. ``memory`` is the stack, with room for one more pair a sample, its
-    depth, and whether more lies deeper than it. It and ``now`` (input, output) are moved on.
-    Returned are the new depth and how many samples were done: the next one lies beyond the
-    limits, or wipes out what lies deeper.
+    ``memory`` is the stack, with room for one more pair a sample, its depth, and whether more lies
+    deeper. It and ``now`` (input, output) are moved on. Returned are the new depth and how many
+    samples were done: the next one lies beyond the ``limits``, or wipes out what lies deeper.
     """
     (stack, depth, deeper), k, here = memory, 0, (now[INPUT], now[OUTPUT])
     while k < len(block) and limits[0] <= block[k] <= limits[1]:
@@ -207,8 +198,7 @@ def walk_copy(
 ) -> tuple[Array, Array, int]:
     """Walk on from a memory that stays as it is: a stack, and whether more lies deeper than it.
 
-    Returned are the stack after it, of shape (2, depth), the present pair and how many samples
-    were done, as of ``walk``. One call for all that a short block needs.
+    Returned are the stack after it, (2, depth), the present pair and how many samples were done.
     """
     before, deeper = memory
     depth, now = before.shape[1], now.copy()

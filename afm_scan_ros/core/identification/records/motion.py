@@ -10,7 +10,6 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import detrend
 from scipy.stats import t as student
 
-from afm_scan_ros.core.least_squares import NORMAL_95
 from afm_scan_ros.core.types import Array, Trace
 
 EARLY, LATE = 1e-3, 2.5e-2
@@ -166,6 +165,8 @@ END, FLAT = 0.05, 0.5
 """A record saturates where its slope in this share at an end is below this share of the mean."""
 FAR = 0.5
 """Share of the drive's range that a branch covers whose slopes are compared."""
+NORMAL_95 = 1.959964
+"""97.5th percentile of the standard normal distribution."""
 SLOW = 0.9
 """Correlation of drive and displacement from which a record is slow enough to have slopes."""
 

@@ -16,11 +16,11 @@ from attrs import evolve, frozen
 from scipy.optimize import least_squares
 from scipy.signal import argrelmin
 
+from afm_scan_ros.core.arguments import require_converged
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.vibration import VibrationModel
 from afm_scan_ros.core.fit.likeness import jackknife
 from afm_scan_ros.core.fit.noise import correlation_length
-from afm_scan_ros.core.least_squares import require_converged
 from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import NormalEquations, solve

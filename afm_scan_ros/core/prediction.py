@@ -1,22 +1,29 @@
-"""A model a little beyond the drive that it was identified in, for predictions alone.
+"""A prediction beyond the drive that a model was identified in, and its standard deviation.
 
-Branches go on with the slopes that they have at the ends of the range. How much displacement that
-adds is unknown by as much as these slopes differ from the mean one.
+Beyond, branches go on with the slopes that they have at the ends of the range. How much
+displacement that adds is unknown by as much as these slopes differ from the mean one. The rest of
+the error follows from the parameters, and from the model's error on its records.
 """
 
 import math
+from functools import partial
 
 import numpy as np
 from attrs import evolve, frozen
 
+from afm_scan_ros.core.bands import rms_by_band
+from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.effects.hysteresis.duhem import DuhemSlopes
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.intersample import HELD, voltages_of
+from afm_scan_ros.core.effects.scale import resonance_of
+from afm_scan_ros.core.errors import InputError
+from afm_scan_ros.core.intersample import HELD, held_voltages, moved_by, voltages_of
 from afm_scan_ros.core.model import AxisModel, HysteresisOperator, ScannerModel, effect_of
 from afm_scan_ros.core.record import Record
-from afm_scan_ros.core.settings import setting
-from afm_scan_ros.core.types import Array, Trace
+from afm_scan_ros.core.scanner import forward
+from afm_scan_ros.core.spread import Spread, Variant
+from afm_scan_ros.core.types import AXES, Array, Trace, setting
 
 
 @frozen
@@ -35,11 +42,7 @@ SHARE = ExtensionSettings().share
 
 
 def extended(model: ScannerModel, drive: Trace, share: float = SHARE) -> ScannerModel:
-    """Return the model with a wider range for each axis whose drive (V) leaves the identified one.
-
-    It is wider by a share of the voltages at its ends. Where a drive goes farther, the range stays,
-    and does not hold it.
-    """
+    """Return the model, wider by a share for axes whose drive (V) leaves the identified range."""
     axes = {n: extended_axis(model.axis(n), getattr(drive, n), share) for n in model.axes}
     return evolve(model, **axes)
 
@@ -93,10 +96,7 @@ def _wider(operator: HysteresisOperator, share: float) -> HysteresisOperator:
 
 
 def _surface(surface: EverettSurface, share: float) -> EverettSurface:
-    """Add a level above an upper end over 0 V, and one below a lower end under 0 V.
-
-    Up to these E goes on straight. The output at depolarised rest stays the same.
-    """
+    """Add levels beyond both ends, up to which E goes on straight; the output at rest stays."""
     grown = 1.0 + share
     levels, values = surface.levels, np.tril(surface.values)
     if surface.upper > 0.0:
@@ -130,3 +130,76 @@ def _slopes(slopes: DuhemSlopes, share: float) -> DuhemSlopes:
     ends = slopes.lower - count * cell, slopes.upper + count * cell
     wider = DuhemSlopes(*ends, 0.0, slopes.rest, slopes.widths, centre, rising, falling)
     return evolve(wider, offset=slopes.offset - wider.height(slopes.lower))
+
+
+def standard_deviation(
+    model: ScannerModel, drive: Trace, moved: Trace, share: float = SHARE, intersample: str = HELD
+) -> Trace:
+    """Standard deviation (m) of a motion predicted for a drive (V), without the sensor's noise.
+
+    Without a ``Spread`` it is the rms error of the motion. InputError where an axis has none.
+    """
+    found, period = {name: np.zeros_like(moved.x) for name in AXES}, drive.sample_period
+    for name in model.axes:
+        axis, volts, motion = model.axis(name), drive.axis(name), moved.axis(name)
+        beyond = unknown_beyond(axis, volts, share)
+        if axis.spread is None:
+            found[name] = np.hypot(_of_records(axis, name, motion, period), beyond)
+            continue
+        known = np.sum(apart(axis, axis.spread, volts, period, share, intersample) ** 2, axis=0)
+        left = discrepancy(axis.spread, motion, period)
+        found[name] = np.sqrt(known + left**2 + beyond**2)
+    return evolve(moved, x=found["x"], y=found["y"])
+
+
+def apart(
+    axis: AxisModel,
+    spread: Spread,
+    drive: Array,
+    sample_period: float,
+    share: float = SHARE,
+    intersample: str = HELD,
+) -> Array:
+    """What a standard deviation in each direction adds to a prediction (m), (directions, n).
+
+    Effects that were added to the axis are left out. About the mean, where the rest is not known.
+    """
+    volts = held_voltages(drive, intersample)
+
+    def moved(variant: Variant) -> Array:
+        wider = extended_axis(varied(axis, variant), volts, share)
+        return moved_by(partial(forward, wider), drive, sample_period, intersample)
+
+    middle = moved(spread.centre)
+    each = np.array([(moved(one) - middle) / one.deviations for one in spread.directions])
+    each = each.reshape(-1, len(drive))
+    return each if spread.rest_known else each - each.mean(axis=1, keepdims=True)
+
+
+def discrepancy(spread: Spread, moved: Array, sample_period: float) -> float:
+    """Rms error (m) of a predicted motion (m), (n,), beyond what its parameters explain."""
+    return float(np.linalg.norm(spread.shares * rms_by_band(moved, spread.bands, sample_period)))
+
+
+def varied(axis: AxisModel, variant: Variant) -> AxisModel:
+    """Return an axis with the effects of a variant, and without any that was added to it."""
+    return evolve(
+        axis,
+        hysteresis=evolve(axis.hysteresis, forward=variant.forward, output=variant.output),
+        vibration=variant.vibration,
+        creep=variant.creep,
+        sensor=variant.sensor,
+        added=(),
+    )
+
+
+def _of_records(axis: AxisModel, name: str, moved: Array, sample_period: float) -> float:
+    """Rms error (m) of a motion by that on the model's records."""
+    if not axis.model_discrepancies:
+        raise InputError(
+            f"the model of axis {name} states no error, so none of a prediction: identify it anew,"
+            " with a validation record"
+        )
+    resonance = resonance_of(axis.vibration, sample_period)
+    limit = detection_limit(axis.model_discrepancies, moved, sample_period, resonance)
+    return float(np.sqrt(np.sum(np.maximum(limit.rms**2 - limit.noise**2, 0.0))))
