@@ -31,7 +31,7 @@ from afm_scan_ros.core.diagnosis.records import (
 )
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.identification.records.kinds import repeated_part
+from afm_scan_ros.core.identification.records.periods import repeated_part
 from afm_scan_ros.core.model import ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of

@@ -13,7 +13,7 @@ from attrs import define, evolve, field, frozen
 from afm_scan_ros.core.chain import Chain, Stage
 from afm_scan_ros.core.effects.base import Cascade
 from afm_scan_ros.core.effects.residual_features import prominent_lines
-from afm_scan_ros.core.identification.records.kinds import repeated_part
+from afm_scan_ros.core.identification.records.periods import repeated_part
 from afm_scan_ros.core.intersample import HELD, held_voltages, read_between, upsampling
 from afm_scan_ros.core.model import Range
 from afm_scan_ros.core.record import Record

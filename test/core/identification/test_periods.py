@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.identification.drives.waveforms import multisine
-from afm_scan_ros.core.identification.records.kinds import is_periodic, repeated_part, repetition
+from afm_scan_ros.core.identification.records.periods import is_periodic, repeated_part, repetition
 from afm_scan_ros.core.types import Array
 
 
