@@ -179,13 +179,13 @@ class AxisDiagnosis:
         """Whether a selected effect may be the model's error, which is not known for the motion.
 
         A hysteresis that was identified from other loops errs as one whose gain has changed. A
-        disturbance away from the motion's harmonics is no such error.
+        disturbance of which a line lasts between the motion's harmonics is no such error.
         """
         selected = self.selection.selected
         every = selected.candidates if selected else ()
-        return self.untested and not all(
-            any(parameter.located for parameter in each.form.parameters) for each in every
-        )
+        tones = all(any(p.located for p in each.form.parameters) for each in every)
+        lasting = (each.lasting_lines(self.chain) for each in self.evidence)
+        return self.untested and not (tones and any(lasting))
 
     @property
     def final(self) -> Chain:
