@@ -23,11 +23,13 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, CellFit
+from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
 from afm_scan_ros.core.diagnosis.variance import CellVariance, log_density
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
+from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array
 from helpers.in_process import default_model
@@ -228,6 +230,17 @@ LAG = effect_type("rate_dependent_hysteresis").form("")
 """Its time constant is from 0 to 1 s."""
 
 
+def verdict_of(left: CellFit, seconds: float) -> str:
+    """Verdict where a lag of so many seconds leaves so much."""
+    fit = Fit(np.array([[seconds]]), np.array([0.1]))
+    trial = FittedCandidates((Candidate(effect_type("rate_dependent_hysteresis"), LAG),), fit, left)
+    without = no_effect(evolve(left, log_likelihood=-100.0))
+    selection = Selection(without, (trial,), Posterior.of(without, [trial]))
+    view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
+    chain, evidence = chain_of(default_model().x), Evidence(Playback(view), limit(1.0, 1.0))
+    return AxisDiagnosis("x", (evidence,), chain, chain, chain, selection, ()).verdict
+
+
 @pytest.mark.parametrize(
     ("power", "seconds", "verdict"),
     [(30.0, 0.5, FOUND), (30.0, 1.0, UNEXPLAINED), (1.0, 1.0, FOUND)],
@@ -237,13 +250,23 @@ def test_the_error_of_a_formula_counts_inside_the_range_alone(
 ) -> None:
     """At an end of its range an effect must explain the residual as if its formula were exact."""
     left = CellFit(*(np.array([each]) for each in (power, 30.0, KAPPA, NU)), 0.0)
-    fit = Fit(np.array([[seconds]]), np.array([0.1]))
-    trial = FittedCandidates((Candidate(effect_type("rate_dependent_hysteresis"), LAG),), fit, left)
-    without = no_effect(evolve(left, log_likelihood=-100.0))
-    selection = Selection(without, (trial,), Posterior.of(without, [trial]))
-    view = AxisSignals("record", PERIOD, *(np.zeros(100) for _ in range(3)))
-    chain = chain_of(default_model().x)
-    found = AxisDiagnosis(
-        "x", (Evidence(Playback(view), limit(1.0, 1.0)),), chain, chain, chain, selection, ()
-    )
-    assert found.verdict == verdict
+    assert verdict_of(left, seconds) == verdict
+
+
+@pytest.mark.parametrize(("tail", "verdict"), [(0.007, UNEXPLAINED), (0.014, FOUND)])
+def test_what_an_effect_leaves_is_judged_as_beside_a_known_error(tail: float, verdict: str) -> None:
+    power = fisher.isf(tail, NU, KAPPA)
+    left = CellFit(*(np.array([each]) for each in (power, 1.0, UNTESTED, NU)), 0.0)
+    assert left.adequate
+    assert verdict_of(left, 0.5) == verdict
+
+
+def test_a_record_that_begins_depolarised_errs_no_more_at_its_first_move() -> None:
+    time, model = PERIOD * np.arange(2000), default_model()
+    drive = np.sin(20.0 * np.pi * time)
+    moved = 4e-6 * drive
+    limits = [
+        evidence_of("x", model, Record(drive, moved, PERIOD, start=start)).limit.rms
+        for start in ("depolarised", "unknown")
+    ]
+    assert limits[1].max() == pytest.approx(3.0 * limits[0].max(), rel=0.01)
