@@ -51,10 +51,12 @@ def _run(
 ) -> None:
     if not scanner.external:
         isolate()
-    with watching(title) as (shown, idle), ExitStack() as open_views:
+    with watching(title) as (watch, idle), ExitStack() as open_views:
         for name, where in views.items():
-            open_views.enter_context(orders.VIEWS[name].beside_nodes(where, shown))
-        run_nodes(commands, idle, [scanner.node])
+            open_views.enter_context(orders.VIEWS[name].beside_nodes(where, watch.shown))
+        for node in run_nodes(commands, idle, [scanner.node]):
+            for warning in node.warnings:  # which a listener that met the node late has not heard
+                watch.tell(node.name, warning)
 
 
 def _pace(time_scale: float) -> orders.Parameters:

@@ -25,10 +25,10 @@ MOMENT = 0.1
 class ScanWatch:
     """Follows scan_info and node_state; shows the slowest node's progress and all reasons."""
 
-    _shown: ScanProgress
+    shown: ScanProgress
     _total: int = field(default=0, init=False)
     _slowest: dict[str, int] = field(factory=dict, init=False)
-    _last_reason: str = field(default="", init=False)
+    _told: set[str] = field(factory=set, init=False)
 
     def meet(self, info: Message) -> None:
         """Learn how long the scan is."""
@@ -36,20 +36,25 @@ class ScanWatch:
 
     def hear(self, state: Message) -> None:
         """Show a node's state, also where its last state is the first that is heard."""
-        if state.state in (RUNNING, DONE) and state.reason not in ("", self._last_reason):
-            self._last_reason = state.reason
-            self._shown.say(f"{state.node}: {state.reason}")
+        if state.state in (RUNNING, DONE) and state.reason:
+            self.tell(state.node, state.reason)
         self._slowest[state.node] = state.next_sample
         done = min(self._slowest.values())
         if not done:
-            self._shown.doing(f"{state.node}: {state.reason or state.state}")
+            self.shown.doing(f"{state.node}: {state.reason or state.state}")
         elif self._total:
-            self._shown.moved(done, self._total)
+            self.shown.moved(done, self._total)
+
+    def tell(self, node: str, news: str) -> None:
+        """Show what a node says, once."""
+        if (text := f"{node}: {news}") not in self._told:
+            self._told.add(text)
+            self.shown.say(text)
 
 
 @contextmanager
-def watching(title: str) -> Iterator[tuple[ScanProgress, Callable[[], None]]]:
-    """Show a scan while it runs; yield what shows it, and a function that listens for a moment."""
+def watching(title: str) -> Iterator[tuple[ScanWatch, Callable[[], None]]]:
+    """Show a scan while it runs; yield what follows it, and what listens for a moment."""
     join([])
     try:
         with showing(title) as shown:
@@ -58,10 +63,7 @@ def watching(title: str) -> Iterator[tuple[ScanProgress, Callable[[], None]]]:
             for topic, hear in ((SCAN_INFO, watch.meet), (NODE_STATE, watch.hear)):
                 node.create_subscription(topic.kind, topic.name, hear, topic.reader)
             executor.add_node(node)
-            yield shown, lambda: executor.spin_once(timeout_sec=MOMENT)
-            last = time.monotonic() + MOMENT
-            while time.monotonic() < last:  # what the nodes said at their end
-                executor.spin_once(timeout_sec=0.0)
+            yield watch, lambda: executor.spin_once(timeout_sec=MOMENT)
             executor.shutdown()
     finally:
         rclpy.shutdown()

@@ -75,19 +75,22 @@ LOG = "traceback.log"
 """File in a bag's folder."""
 _LOGGED = re.compile(r"^(\[[^]]*\] ){2}\[[^]]*\]: ")
 """What stands before the text of a log line."""
+_WARNED = re.compile(r"^\[WARN\] \[[^]]*\] \[[^]]*\]: (.*)$", re.MULTILINE)
 
 
 @frozen
 class Ended:
     """How a node ended: 0, 2 bad input, 3 what was asked does not hold, negative for a signal.
 
-    ``traceback`` is its output where that holds the traceback of an unforeseen error.
+    ``traceback`` is its output where that holds the traceback of an unforeseen error, ``warnings``
+    are those that it logged.
     """
 
     name: str
     status: int
     said: str
     traceback: str = ""
+    warnings: tuple[str, ...] = ()
 
 
 @frozen
@@ -132,7 +135,8 @@ class NodeProcess:
         """Return how it ended."""
         written = self._written()
         traceback = written if TRACEBACK in written else ""
-        return Ended(self.name, self.process.returncode, self.last_words(), traceback)
+        warnings = tuple(_WARNED.findall(written))
+        return Ended(self.name, self.process.returncode, self.last_words(), traceback, warnings)
 
     def last_words(self) -> str:
         """Return its last line of output, or the signal that killed it.
@@ -188,7 +192,7 @@ def _set_aside(bags: Iterable[Path], error: BaseException) -> str:
 
 def run_nodes(
     commands: Sequence[NodeCommand], idle: Callable[[], None], others: Sequence[str] = ()
-) -> None:
+) -> list[Ended]:
     """Run nodes until all have ended, calling ``idle``, which takes a moment, meanwhile.
 
     ``others`` are nodes that may have begun the trouble too, wherever they run.
@@ -205,8 +209,10 @@ def run_nodes(
             _wait(running, idle)
         finally:
             stuck = _end(running)
-        raise_failure([node.ended() for node in running if node not in stuck], names)
+        ended = [node.ended() for node in running if node not in stuck]
+        raise_failure(ended, names)
         raise_failure([node.ended() for node in stuck], names)
+        return ended
 
 
 def _wait(nodes: Sequence[NodeProcess], idle: Callable[[], None]) -> None:
