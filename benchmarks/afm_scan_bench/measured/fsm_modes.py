@@ -29,7 +29,7 @@ COLUMNS = {
 
 
 @frozen(eq=False)
-class Mode:
+class ShapedMode:
     """A vibration: ``frequency`` in Hz, at which it would swing undamped, and damping ratio.
 
     ``left`` (p,) and ``right`` (m,): how it shows in the outputs and is driven, of length 1.
@@ -40,13 +40,13 @@ class Mode:
     left: Complex
     right: Complex
 
-    def likeness(self, other: "Mode") -> float:
+    def likeness(self, other: "ShapedMode") -> float:
         """1 where both have the same shape in inputs and outputs, 0 where they share nothing."""
         shapes = np.vdot(self.left, other.left) * np.vdot(self.right, other.right)
         return float(np.abs(shapes))
 
 
-def modes(model: StateSpaceModel) -> tuple[Mode, ...]:
+def modes(model: StateSpaceModel) -> tuple[ShapedMode, ...]:
     """Return the vibrations, from the slowest: one for each pair of complex poles."""
     form = modal_form(model.a, model.b, model.c, model.d)
     rates = np.log(form.poles) / model.sample_period
@@ -54,7 +54,9 @@ def modes(model: StateSpaceModel) -> tuple[Mode, ...]:
         shape / np.linalg.norm(shape, axis=1, keepdims=True) for shape in (form.left, form.right)
     )
     return tuple(
-        Mode(float(np.abs(rate) / (2.0 * np.pi)), float(-rate.real / np.abs(rate)), left, right)
+        ShapedMode(
+            float(np.abs(rate) / (2.0 * np.pi)), float(-rate.real / np.abs(rate)), left, right
+        )
         for rate, left, right in sorted(
             zip(rates, lefts, rights, strict=True), key=lambda term: float(np.abs(term[0]))
         )
@@ -83,7 +85,7 @@ def measure() -> Table:
     return Table("fsm_modes", title, COLUMNS, rows)
 
 
-def found(mode: Mode, amplitude: int) -> Found:
+def found(mode: ShapedMode, amplitude: int) -> Found:
     """Find a mode again at an amplitude; the interval is the jackknife's over realisations."""
     own = alike(mode, fitted(amplitude))
     others = [alike(own, fitted(amplitude, k)) for k in REALISATIONS]
@@ -93,7 +95,7 @@ def found(mode: Mode, amplitude: int) -> Found:
     return Found(np.array([own.frequency, own.damping]), t.ppf(0.975, count - 1) * error)
 
 
-def alike(mode: Mode, model: StateSpaceModel) -> Mode:
+def alike(mode: ShapedMode, model: StateSpaceModel) -> ShapedMode:
     """Return the model's mode of the most similar shape among those near in frequency."""
     near = [other for other in modes(model) if abs(other.frequency / mode.frequency - 1.0) < NEAR]
     return max(near, key=mode.likeness)
