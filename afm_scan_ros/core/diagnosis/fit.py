@@ -314,6 +314,7 @@ class ParameterLayout:
         parameter of one record alone has its prior in another.
         """
         precision, axes = np.linalg.eigh(inner)
+        precision = np.maximum(precision, 1.0)  # the prior's own, which rounding may hide
         shared = (widths[:, np.newaxis] * axes / np.sqrt(precision))[self._index[0]].T
         own = np.array([p.own for p in self.parameters])
         shared[:, own] = 0.0

@@ -36,6 +36,15 @@ def test_they_make_the_covariance(seed: int) -> None:
     assert found.T @ found == pytest.approx(expected, abs=1e-9)
 
 
+def test_what_rounding_hides_of_the_prior_is_there_all_the_same() -> None:
+    """Beside a precision of 10^17 the prior's one is lost, or even negative."""
+    layout = ParameterLayout([FORM], RECORDS)
+    slope = 3e8 * np.ones((1, layout.count))
+    inner = np.eye(layout.count) + slope.T @ slope - 20.0 * np.eye(layout.count)
+    found = layout.of_further_record(np.ones(layout.count), inner)
+    assert np.abs(found).max() <= 1.0
+
+
 @pytest.mark.parametrize("value", [0.0, 1e-3, 5e-3])
 def test_values_stay_within_their_range(value: float) -> None:
     effect: EffectType = effect_type("delay")
