@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
+from afm_scan_ros.core.diagnosis.least_squares import minimised
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import CONFIDENT
@@ -58,7 +58,7 @@ class BaseRidge:
     I - A V diag(1 / (q (1 + q))) Vᵀ Aᵀ, where V diag(q² - 1) Vᵀ is the influence's Gram matrix.
     """
 
-    def __init__(self, influences: Sequence[Array]) -> None:
+    def __init__(self, influences: Array) -> None:
         self._influence = np.atleast_2d(influences)
         values, axes = np.linalg.eigh(self._influence @ self._influence.T)
         root = np.sqrt(1.0 + np.maximum(values, 0.0))
@@ -92,9 +92,9 @@ class Problem:
         self._layout, self._span = ParameterLayout(forms, len(evidence), reach, longest), span
         self._steps, self._lower, self._upper = map(self._layout.each, ("step", "lower", "upper"))
         self._spans = self._layout.each("spans_decades") > 0.0
-        self._last: tuple[Array, Array] | None = None
-        base = zip(*(each.cells.along(each.base) for each in evidence), strict=True)
-        self._base = BaseRidge([self._joined(signals) for signals in base])
+        self._last: tuple[Array, list[Array]] | None = None
+        base = [[seen(each, one) for one in each.cells.along(each.base)] for each in evidence]
+        self._base = BaseRidge(np.hstack(base))
 
     def begin(
         self, starts: Iterable[Array], own: Iterable[Array] = (), new: slice = ALL
@@ -118,35 +118,29 @@ class Problem:
         inserted later hardly change their influence.
         """
         values = self._bounded(rows)
-        here = self._excess(values)
-        return tuple(self._influence(values, here, i) for i in self._layout.own)
+        return tuple(self._influence(values, i) for i in self._layout.own)
 
     def descend(self, start: Array) -> Fit | None:
         """Fit from a start; None where the forms cannot be applied on the way."""
         try:
-            begun = self._bounded(start)
-            cost = 0.5 * float(np.sum(self._excess(begun) ** 2))
-            found = least_squares(
+            free, slope = minimised(
                 self._excess,
-                begun,
-                jac=lambda values: self._jacobian(values, {}, None),
-                bounds=(self._lower, self._upper),
-                x_scale="jac",
-                max_nfev=ROUNDS,
-                ftol=TOLERANCE / max(cost, 1.0),  # of the cost, of which noise is nearly all
-                xtol=None,
-                gtol=None,
+                lambda values: self._jacobian(values, {}, None),
+                self._bounded(start),
+                (self._lower, self._upper),
+                ROUNDS,
+                TOLERANCE,
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None
-        halves = CONFIDENT * np.sqrt(np.diag(_inverse(found.jac)))
+        halves = CONFIDENT * np.sqrt(np.diag(_inverse(slope)))
         rows = self._layout.rows
-        widths = self._layout.prior_widths(found.x, self._span)
-        scaled = found.jac * widths
+        widths = self._layout.prior_widths(free, self._span)
+        scaled = slope * widths
         inner = np.eye(len(widths)) + scaled.T @ scaled  # by Laplace's method
         volume = float(-0.5 * np.linalg.slogdet(inner)[1])
         deviations = self._layout.of_further_record(widths, inner)
-        return Fit(rows(found.x), rows(halves)[0], volume, deviations)
+        return Fit(rows(free), rows(halves)[0], volume, deviations)
 
     def _bounded(self, rows: Array) -> Array:
         return np.clip(self._layout.free(rows), self._lower, self._upper)
@@ -179,29 +173,31 @@ class Problem:
         return best
 
     def _excess(self, values: Array) -> Array:
-        """Weighted residuals of all records.
+        """Weighted residuals of all records, at values that are free."""
+        return self._base.left(np.concatenate(self._parts(values)))
+
+    def _parts(self, values: Array) -> list[Array]:
+        """Weighted residual of each record.
 
         The last result is cached, since differences are taken at the values of the last step.
         """
-        if self._last and np.array_equal(values, self._last[0]):
-            return self._last[1]
-        chain = inserted(self._chain, self._forms, self._layout.rows(values))
-        joined = self._joined(each.coefficients(chain) for each in self._evidence)
-        self._last = values.copy(), self._base.left(joined)
+        if not (self._last and np.array_equal(values, self._last[0])):
+            every = range(len(self._evidence))
+            self._last = values.copy(), [self._part(values, record) for record in every]
         return self._last[1]
 
-    def _joined(self, coefficients: Iterable[Array]) -> Array:
-        """Weighted coefficients of all records, one after the other."""
-        return np.concatenate(list(map(self._seen, self._evidence, coefficients)))
+    def _part(self, values: Array, record: int) -> Array:
+        evidence = self._evidence[record]
+        chain = inserted(self._chain, self._forms, self._layout.rows(values))
+        return self._seen(evidence, evidence.coefficients(chain))
 
     def _jacobian(self, values: Array, known: Mapping[int, Array], widths: Array | None) -> Array:
-        here = self._excess(values)
         found = []
         for i in range(len(values)):
             if widths is not None and widths[i]:
                 found.append(self._secant(values, i, float(widths[i])))
             else:
-                found.append(known[i] if i in known else self._influence(values, here, i))
+                found.append(known[i] if i in known else self._influence(values, i))
         return np.column_stack(found)
 
     def _secant(self, values: Array, i: int, width: float) -> Array:
@@ -214,13 +210,18 @@ class Problem:
         (low, below), (high, above) = ends
         return np.asarray((above - below) / (high - low))
 
-    def _influence(self, values: Array, here: Array, i: int) -> Array:
-        """Difference quotient from the residual ``here``, taken inwards at a bound."""
+    def _influence(self, values: Array, i: int) -> Array:
+        """Difference quotient, taken inwards at a bound, of the records that a number is of."""
         step = self._steps[i]
         signed = step if values[i] + step <= self._upper[i] else -step
-        there = values.copy()
+        there, here = values.copy(), self._parts(values)
         there[i] += signed
-        return np.asarray((self._excess(there) - here) / signed)
+        records = self._layout.records_of(i)
+        found = [
+            self._part(there, record) - part if record in records else np.zeros_like(part)
+            for record, part in enumerate(here)
+        ]
+        return self._base.left(np.concatenate(found) / signed)
 
 
 def _inverse(jacobian: Array) -> Array:
@@ -296,6 +297,10 @@ class ParameterLayout:
         """Free numbers that belong to one record, parameter by parameter."""
         which = [p.own for p in self.parameters]
         return tuple(int(i) for i in self._index[:, which].T.ravel())
+
+    def records_of(self, number: int) -> set[int]:
+        """Records that a free number has an influence on."""
+        return set(np.flatnonzero(np.any(self._index == number, axis=1)).tolist())
 
     def rows(self, free: Array) -> Array:
         """Values (r, p) of the free numbers (f,)."""

@@ -53,6 +53,16 @@ def test_noise_between_the_harmonics_has_as_many_amplitudes_as_coefficients() ->
     )
 
 
+def test_an_error_at_a_resonance_is_no_noise_of_the_bands_beside() -> None:
+    """It ends where the record ends, which spreads it over all frequencies."""
+    rng, time = np.random.default_rng(4), np.arange(COUNT) * PERIOD
+    swings = np.interp(time, np.arange(0.0, 18.0, 2.0), rng.standard_normal(9))
+    resonance = 300.0 * (1.0 + swings) * np.sin(2.0 * np.pi * 60.3 * time)
+    without = rng.standard_normal(COUNT)
+    noise = [found(each).noise[CELLS.bands :] for each in (without, without + resonance)]
+    np.testing.assert_allclose(noise[1][[2, 4]], noise[0][[2, 4]], rtol=0.1)
+
+
 def test_what_leaks_of_the_error_has_few_amplitudes() -> None:
     """An error of the motion that changes from period to period leaves no room for more."""
     rng = np.random.default_rng(2)
