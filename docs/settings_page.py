@@ -6,6 +6,7 @@ from attrs import fields
 
 from afm_scan_ros.core.diagnosis.settings import (
     DecimationSettings,
+    DescentSettings,
     PartingSettings,
     PosteriorSettings,
     StructureSettings,
@@ -21,6 +22,7 @@ SETTINGS: tuple[type, ...] = (
     SafetySettings,
     FitSettings,
     IntersampleSettings,
+    DescentSettings,
     PartingSettings,
     DecimationSettings,
     PosteriorSettings,

@@ -18,9 +18,6 @@ from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 
-ROUNDS = 30
-TOLERANCE = 1e-2
-"""Change of the cost in nats that ends a fit; competing models differ by far more."""
 ALL = slice(None)
 STEP_SHARES = (1.0, 0.2)
 SECANTS = 0.06, 0.02, 0.006, 0.002
@@ -128,8 +125,6 @@ class Problem:
                 lambda values: self._jacobian(values, {}, None),
                 self._bounded(start),
                 (self._lower, self._upper),
-                ROUNDS,
-                TOLERANCE,
             )
         except (InputError, ScanError, np.linalg.LinAlgError):
             return None

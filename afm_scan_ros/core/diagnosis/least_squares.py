@@ -13,12 +13,8 @@ from attrs import frozen
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
+from afm_scan_ros.core.diagnosis.settings import DESCENT, DescentSettings
 from afm_scan_ros.core.types import Array
-
-LEAST_DAMPING = 1e-10
-"""Of a scaled column's square: above the rounding of the normal equations."""
-FIRST_DAMPING = 1e-3
-"""Madsen et al., of a start that is believed to be good."""
 
 
 @frozen(eq=False)
@@ -64,19 +60,18 @@ def minimised(
     jacobian: Callable[[Array], Array],
     start: Array,
     bounds: tuple[Array, Array],
-    rounds: int,
-    tolerance: float,
+    settings: DescentSettings = DESCENT,
 ) -> tuple[Array, Array]:
     """Return values (f,) that a residual's sum of squares is least at, and the Jacobian (n, f).
 
-    They are found after so many ``rounds``, or where no step lowers half that sum by more than the
-    ``tolerance``.
+    They are found after the most rounds, or where no step lowers half that sum by more than the
+    tolerance.
     """
-    values, damping, worse = start, FIRST_DAMPING, 2.0
+    values, damping, worse = start, settings.first_damping, 2.0
     left, slope = residual(values), jacobian(values)
-    for _ in range(rounds):
+    for _ in range(settings.rounds):
         equations = Equations.of(slope, left, bounds[0] - values, bounds[1] - values)
-        if equations.gain(equations.move(LEAST_DAMPING)) < tolerance:
+        if equations.gain(equations.move(settings.least_damping)) < settings.tolerance:
             break
         move = equations.move(damping)
         foreseen, tried = equations.gain(move), np.clip(values + move / equations.size, *bounds)
@@ -84,9 +79,9 @@ def minimised(
         fell = 0.5 * float(left @ left - there @ there)
         if fell > 0.0:
             better = max(1.0 / 3.0, 1.0 - (2.0 * fell / foreseen - 1.0) ** 3)
-            damping, worse = max(better * damping, LEAST_DAMPING), 2.0
+            damping, worse = max(better * damping, settings.least_damping), 2.0
             values, left, slope = tried, there, jacobian(tried)
-        elif foreseen < tolerance:
+        elif foreseen < settings.tolerance:
             break
         else:
             damping, worse = worse * damping, 2.0 * worse

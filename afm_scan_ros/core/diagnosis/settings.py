@@ -134,3 +134,28 @@ class DecimationSettings:
 
 
 DECIMATION = DecimationSettings()
+
+
+@frozen
+class DescentSettings:
+    """How effects are fitted to the residual."""
+
+    rounds: int = setting(30, "1", "steps of a fit, at most", "limits the work")
+    tolerance: float = setting(
+        0.01,
+        "nat",
+        "gain of a step below which a fit ends",
+        "competing effects differ by far more",
+    )
+    first_damping: float = setting(
+        1e-3,
+        "1",
+        "damping of the first step, of a scaled column's square",
+        "Madsen, Nielsen and Tingleff 2004, of a start that is believed to be good",
+    )
+    least_damping: float = setting(
+        1e-10, "1", "damping, at least", "above the rounding of normal equations of scaled columns"
+    )
+
+
+DESCENT = DescentSettings()

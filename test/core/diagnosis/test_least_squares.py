@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares, lsq_linear
 
 from afm_scan_ros.core.diagnosis.least_squares import minimised
+from afm_scan_ros.core.diagnosis.settings import DescentSettings
 from afm_scan_ros.core.types import Array
 
-TOLERANCE = 1e-9
+EXACT = DescentSettings(rounds=200, tolerance=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6), widest=st.floats(0.01, 10.0))
@@ -20,7 +21,7 @@ def test_a_linear_residual_is_fitted_within_its_bounds(
     slope, aim = rng.standard_normal((20, count)), rng.standard_normal(20)
     ends = -widest * rng.uniform(size=count), widest * rng.uniform(size=count)
     start = rng.uniform(*ends)
-    found, _ = minimised(lambda x: slope @ x - aim, lambda _: slope, start, ends, 50, TOLERANCE)
+    found, _ = minimised(lambda x: slope @ x - aim, lambda _: slope, start, ends, EXACT)
     best = lsq_linear(slope, aim, ends, tol=1e-12)
     assert np.all((ends[0] <= found) & (found <= ends[1]))
     assert 0.5 * np.sum((slope @ found - aim) ** 2) <= best.cost + 1e-6 * max(best.cost, 1.0)
@@ -40,7 +41,7 @@ def test_a_decay_is_fitted_as_well_as_by_scipy(rate: float, size: float) -> None
         return np.column_stack((wave, -x[0] * time * wave))
 
     begun = np.array([1.0, 1.0])
-    found, slope = minimised(residual, jacobian, begun, ends, 200, TOLERANCE)
+    found, slope = minimised(residual, jacobian, begun, ends, EXACT)
     best = least_squares(residual, begun, jacobian, ends, x_scale="jac", max_nfev=2000)
     assert 0.5 * np.sum(residual(found) ** 2) <= best.cost * (1.0 + 1e-3) + 1e-7
     np.testing.assert_array_equal(slope, jacobian(found))
@@ -52,6 +53,6 @@ def test_a_parameter_without_influence_stays(blind: int) -> None:
     slope[:, blind] = 0.0
     ends = np.full(2, -9.0), np.full(2, 9.0)
     begun = np.full(2, 0.5)
-    found, _ = minimised(lambda x: slope @ x - 1.0, lambda _: slope, begun, ends, 9, TOLERANCE)
+    found, _ = minimised(lambda x: slope @ x - 1.0, lambda _: slope, begun, ends, EXACT)
     assert found[blind] == 0.5
     assert found[1 - blind] == pytest.approx(1.0, abs=1e-4)
