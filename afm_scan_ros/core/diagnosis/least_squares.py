@@ -14,6 +14,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from afm_scan_ros.core.diagnosis.settings import DESCENT, DescentSettings
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 
 
@@ -33,10 +34,15 @@ class Equations:
 
     @classmethod
     def of(cls, slope: Array, left: Array, lowest: Array, highest: Array) -> "Equations":
-        """Of a Jacobian (n, f), a residual (n,) and bounds (f,) of the move."""
+        """Of a Jacobian (n, f), a residual (n,) and bounds (f,) of the move.
+
+        Raises ScanError where a derivative is not finite.
+        """
         size = np.linalg.norm(slope, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         matrix = slope.T @ slope / np.outer(size, size)
+        if not np.isfinite(matrix).all():
+            raise ScanError("the fit diverged: a response grows without bound")
         return cls(matrix, -(left @ slope) / size, size, lowest * size, highest * size)
 
     def move(self, damping: float) -> Array:

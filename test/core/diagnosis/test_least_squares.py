@@ -8,6 +8,7 @@ from scipy.optimize import least_squares, lsq_linear
 
 from afm_scan_ros.core.diagnosis.least_squares import minimised
 from afm_scan_ros.core.diagnosis.settings import DescentSettings
+from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.types import Array
 
 EXACT = DescentSettings(rounds=200, tolerance=1e-9)
@@ -56,3 +57,9 @@ def test_a_parameter_without_influence_stays(blind: int) -> None:
     found, _ = minimised(lambda x: slope @ x - 1.0, lambda _: slope, begun, ends, EXACT)
     assert found[blind] == 0.5
     assert found[1 - blind] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_response_without_bound_is_refused() -> None:
+    ends = np.zeros(1), np.ones(1)
+    with pytest.raises(ScanError, match="without bound"):
+        minimised(lambda x: x - 1.0, lambda _: np.full((1, 1), np.nan), ends[0], ends, EXACT)
