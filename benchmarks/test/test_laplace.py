@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from afm_scan_bench.diagnosis.laplace import nested
 from afm_scan_bench.diagnosis.prior import LogUniform, distributions
-from afm_scan_ros.core.diagnosis.fit import ParameterLayout
+from afm_scan_ros.core.diagnosis.parameter_layout import ParameterLayout
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.errors import InputError

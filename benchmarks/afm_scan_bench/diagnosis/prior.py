@@ -11,7 +11,8 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.diagnosis.candidates import CandidateFitter, FittedCandidates
-from afm_scan_ros.core.diagnosis.fit import ParameterLayout, inserted
+from afm_scan_ros.core.diagnosis.fit import inserted
+from afm_scan_ros.core.diagnosis.parameter_layout import ParameterLayout
 from afm_scan_ros.core.types import Array
 
 TINY = float(np.finfo(float).tiny)

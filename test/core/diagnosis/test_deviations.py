@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from afm_scan_ros.core.diagnosis.candidates import Candidate, FittedCandidates
-from afm_scan_ros.core.diagnosis.fit import Fit, ParameterLayout
+from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
+from afm_scan_ros.core.diagnosis.parameter_layout import ParameterLayout
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.scanner import chain_of
