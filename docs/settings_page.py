@@ -9,6 +9,7 @@ from afm_scan_ros.core.diagnosis.settings import (
     DescentSettings,
     PartingSettings,
     PosteriorSettings,
+    SearchSettings,
     StructureSettings,
 )
 from afm_scan_ros.core.fit.settings import FitSettings
@@ -26,6 +27,7 @@ SETTINGS: tuple[type, ...] = (
     PartingSettings,
     DecimationSettings,
     PosteriorSettings,
+    SearchSettings,
     StructureSettings,
     ExtensionSettings,
     DrawingSettings,

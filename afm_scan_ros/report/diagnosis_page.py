@@ -7,7 +7,6 @@ from typing import Any
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
-    CERTAIN,
     SUFFICIENT,
     UNEXPLAINED,
     AxisDiagnosis,
@@ -17,6 +16,7 @@ from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
 from afm_scan_ros.core.diagnosis.residual_report import ResidualReport, most_excited_record
 from afm_scan_ros.core.diagnosis.result import IdentifiedEffect, joined
 from afm_scan_ros.core.diagnosis.search import OUTSIDE
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS
 from afm_scan_ros.core.metrics import plain
 from afm_scan_ros.files.coupled_file import save_coupled
@@ -148,7 +148,7 @@ def next_coupled_record(found: CoupledDiagnosis) -> str | None:
     """Say what to record to resolve an ambiguous case; None where nothing is."""
     if found.verdict not in (AMBIGUOUS, UNEXPLAINED):
         return None
-    sets = found.posterior.credible(CERTAIN) if found.verdict == AMBIGUOUS else ()
+    sets = found.posterior.credible(SEARCH.certain) if found.verdict == AMBIGUOUS else ()
     names = {name for names in sets if names != OUTSIDE for name in names}
     needs = {e.needs for e in COUPLED_EFFECTS if e.feedback and e.name in names}
     wanted = "; ".join(sorted(needs)) or "steady periods at further amplitudes"

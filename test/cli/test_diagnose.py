@@ -18,8 +18,8 @@ from afm_scan_ros.cli.calibrate import calibrate
 from afm_scan_ros.cli.main import main
 from afm_scan_ros.cli.recorded import diagnose
 from afm_scan_ros.core.diagnosis import search
-from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN
 from afm_scan_ros.core.diagnosis.experiments import Proposal, SizedExperiment
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
@@ -167,7 +167,7 @@ def test_probabilities_are_those_of_the_json(run: Run) -> None:
     found = run.document["probabilities"]["y"]
     assert sum(found.values()) == pytest.approx(1.0)
     (named,) = run.document["effects"]
-    assert named["probability"] >= CERTAIN
+    assert named["probability"] >= SEARCH.certain
     assert all(0.0 <= a["probability"] <= 1.0 for a in run.document["alternatives"])
     for words in ((run.out / "report.html").read_text("utf-8"), run.result.output):
         assert "Probability in x: drift" in " ".join(words.split())

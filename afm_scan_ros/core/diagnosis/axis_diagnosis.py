@@ -23,7 +23,7 @@ from afm_scan_ros.core.diagnosis.free_directions import with_free_directions
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
-from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.settings import PARTING, SEARCH
 from afm_scan_ros.core.diagnosis.structure import refit_of
 from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
@@ -35,11 +35,6 @@ from afm_scan_ros.core.types import Array, Tally, floats
 
 ALONG = TYPICAL_SHARE / FREEDOM
 """Power of a healthy residual along one influence, in detection limits squared."""
-TIME_PARTS = 4
-"""Parts of a record in time."""
-LARGEST_CHANGE = 0.05
-"""Share of an effect's power that may change from part to part, a fifth of its amount: a formula
-approximates the physics."""
 
 
 def time_varying(
@@ -54,14 +49,14 @@ def time_varying(
         ]
         parts = [part for pair in zip(taken, left, strict=True) for part in _time_parts(*pair)]
         gained = sum(_explained_power(part) for part in parts) - _explained_power(np.hstack(parts))
-        allowed = CONFIDENT**2 * ALONG * len(evidence) + LARGEST_CHANGE * _power(taken)
+        allowed = CONFIDENT**2 * ALONG * len(evidence) + SEARCH.largest_change * _power(taken)
         if gained > allowed:
             yield place
 
 
 def _time_parts(taken: Array, left: Array) -> list[Array]:
     """Parts (2, m) of what an effect explains of a record and of what is left, both (n,)."""
-    return np.array_split(np.stack((taken, left)) / np.sqrt(len(left)), TIME_PARTS, axis=1)
+    return np.array_split(np.stack((taken, left)) / np.sqrt(len(left)), SEARCH.parts, axis=1)
 
 
 def _explained_power(part: Array) -> float:
@@ -78,18 +73,13 @@ def _power(taken: Sequence[Array]) -> float:
     return sum(float(np.mean(each**2)) for each in taken)
 
 
-COMPARABLE = 0.5
-"""Share of the largest amplitude of any tone in any record above which a tone counts as present:
-an asynchronous disturbance is equally large in every record."""
-
-
 def synchronous_places(selected: FittedCandidates, evidence: Sequence[Evidence]) -> Iterator[int]:
     """Yield the places of the disturbances that are synchronous with the drive in every record."""
     views = [each.playback.view for each in evidence]
     for place, candidate in enumerate(selected.candidates):
         if any(parameter.located for parameter in candidate.form.parameters):
             rate, sizes = _drive_tones(candidate.form, selected.fit.rows[:, selected.part(place)])
-            seen = np.argwhere(sizes >= COMPARABLE * sizes.max())
+            seen = np.argwhere(sizes >= SEARCH.present * sizes.max())
             if all(repeats(views[record], (k + 1) * rate) for record, k in seen):
                 yield place
 
@@ -112,8 +102,6 @@ def repeats(view: AxisSignals, frequency: float) -> bool:
 
 SUFFICIENT, FOUND, AMBIGUOUS = "model_sufficient", "effect_found", "ambiguous"
 INSUFFICIENT, UNEXPLAINED = "insufficient_excitation", "unexplained"
-CERTAIN = 0.95
-"""Probability from which on an effect is named, and that of the credible set."""
 
 
 @frozen(eq=False)
@@ -142,7 +130,9 @@ class AxisDiagnosis:
             return UNEXPLAINED
         if selection.selected is None:
             return INSUFFICIENT if self._still else SUFFICIENT
-        certain = all(posterior.of_effect(name) >= CERTAIN for name in selection.selected.names)
+        certain = all(
+            posterior.of_effect(name) >= SEARCH.certain for name in selection.selected.names
+        )
         doubtful = not certain or self.synchronous_places or self.like_own_error
         return AMBIGUOUS if doubtful else FOUND
 

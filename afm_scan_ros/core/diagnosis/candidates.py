@@ -11,6 +11,7 @@ from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
@@ -31,11 +32,7 @@ class Candidate:
         return Candidate(effect, effect.form(self.form.kind))
 
 
-EXPECTED = 0.5
-"""Number of effects that a scanner is expected to have, of all in the catalogue."""
-LOG_ODDS = float(np.log(EXPECTED / len(CATALOGUE)))
-REWEIGHTINGS = 2
-"""Fits of a set, the later ones with the weights of the likelihood about the one before."""
+LOG_ODDS = float(np.log(SEARCH.expected / len(CATALOGUE)))
 CANDIDATES = tuple(
     Candidate(effect, form) for effect in CATALOGUE for form in effect.forms if form.refines is None
 )
@@ -233,7 +230,7 @@ class CandidateFitter:
         disturbed = any(p.located for form in forms for p in form.parameters)
         seen = Evidence.whitened if disturbed else Evidence.whitened_along
         trial = None
-        for _ in range(REWEIGHTINGS):
+        for _ in range(SEARCH.reweightings):
             found = Problem(evidence, self.chain, forms, seen, self.span).descend(rows)
             if found is None:
                 return None

@@ -22,11 +22,12 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.search import OUTSIDE
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
@@ -164,14 +165,14 @@ class Proposal:
     @property
     def settles(self) -> bool:
         """Whether the truth is expected to be as probable as what is named."""
-        return self.probability >= CERTAIN
+        return self.probability >= SEARCH.certain
 
 
 def hypotheses(diagnosed: AxisDiagnosis) -> list[Hypothesis]:
     """Best trial of each set in the credible set."""
     posterior, chain = diagnosed.selection.posterior, diagnosed.chain
     found = []
-    for names in posterior.credible(CERTAIN):
+    for names in posterior.credible(SEARCH.certain):
         if best := posterior.best.get(names):
             near = tuple(best.deviated(chain, SHARE))
             found.append(Hypothesis(best.extended(chain), posterior.logs[names], near))

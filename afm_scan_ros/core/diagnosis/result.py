@@ -7,10 +7,11 @@ from enum import Enum
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, CERTAIN, FOUND, AxisDiagnosis
+from afm_scan_ros.core.diagnosis.axis_diagnosis import AMBIGUOUS, FOUND, AxisDiagnosis
 from afm_scan_ros.core.diagnosis.candidates import FittedCandidates
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import effect_type
 
@@ -101,7 +102,7 @@ class IdentifiedEffect:
     @property
     def equivalent(self) -> tuple[str, ...]:
         """Other forms that the records do not exclude."""
-        return tuple(k for k, p in self.kinds if k != self.kind and p >= 1.0 - CERTAIN)
+        return tuple(k for k, p in self.kinds if k != self.kind and p >= 1.0 - SEARCH.certain)
 
 
 @frozen(eq=False)
@@ -159,7 +160,7 @@ def alternatives(diagnosed: AxisDiagnosis) -> Iterator[Alternative]:
     if stated and (diagnosed.like_own_error or diagnosed.synchronous_places):
         why = WhyNot.UNTESTED if diagnosed.like_own_error else WhyNot.MODEL_ERROR
         yield Alternative(MODEL_ERROR, "", diagnosed.axis, 0.0, math.nan, why, own)
-    credible = posterior.credible(CERTAIN)
+    credible = posterior.credible(SEARCH.certain)
     for names in [n for n in posterior.probability if n != own][:RUNNERS_UP]:
         why = WhyNot.CREDIBLE if names in credible else WhyNot.LESS_PROBABLE
         best = posterior.best.get(names)

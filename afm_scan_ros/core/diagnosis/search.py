@@ -19,13 +19,10 @@ from afm_scan_ros.core.diagnosis.candidates import (
     FittedCandidates,
 )
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array, Tally
 
-NEARLY = 0.01
-"""Probability, relative to the most probable set, from which on a set is considered beside it."""
-AS_PROBABLE = 0.05
-"""Probability of a form over that of the most probable one, from which on it may be preferred."""
 Names = tuple[str, ...]
 """Names of the effects of a set, in alphabetical order; none is the empty set."""
 OUTSIDE: Names = ("outside",)
@@ -89,7 +86,7 @@ class Posterior:
         first = next(iter(self.logs))
         if first not in self.best:
             return first
-        near = (n for n, log in self.logs.items() if log > self.logs[first] + np.log(NEARLY))
+        near = (n for n, log in self.logs.items() if log > self.logs[first] + np.log(SEARCH.near))
         return next((n for n in near if n in self.best and self.best[n].cells.adequate), first)
 
     def of_effect(self, name: str) -> float:
@@ -121,7 +118,7 @@ def _simplest(trials: tuple[FittedCandidates, ...]) -> FittedCandidates:
 
     Numbers that the records do not determine are left out so.
     """
-    least = trials[0].log_posterior + np.log(AS_PROBABLE)
+    least = trials[0].log_posterior + np.log(SEARCH.as_probable)
     near = (trial for trial in trials if trial.log_posterior >= least)
     return min(near, key=lambda trial: trial.fit.rows.shape[1])
 
@@ -133,13 +130,6 @@ def _distinct(trials: Iterable[FittedCandidates]) -> tuple[FittedCandidates, ...
         forms = sorted(f"{c.effect.name} {c.form.kind}" for c in trial.candidates)
         best.setdefault(tuple(forms), trial)
     return tuple(best.values())
-
-
-MOST_EFFECTS = 3
-BEAM = 3
-"""Sets of one size that are extended."""
-FITTED = 6
-"""Candidates that are fitted beside a set, of all those with starting values."""
 
 
 @frozen(eq=False)
@@ -189,14 +179,14 @@ class ModelSearch:
 
     def select(self) -> Selection:
         """Fit sets of growing size, as long as more effects may explain more."""
-        while self._size < MOST_EFFECTS and self._may_grow():
+        while self._size < SEARCH.most_effects and self._may_grow():
             self.grow()
         return self.selection
 
     def grow(self) -> None:
         """Fit sets of one effect more."""
         parents: list[FittedCandidates | None] = [*self._parents()] if self._size else [None]
-        self._tally.plan(sum(len(_addable(parent)) + FITTED for parent in parents))
+        self._tally.plan(sum(len(_addable(parent)) + SEARCH.fitted for parent in parents))
         found = [trial for parent in parents for trial in self._beside(parent)]
         found += [trial for best in _best(found, 2) for trial in self._other_forms(best)]
         self._trials += found
@@ -223,11 +213,11 @@ class ModelSearch:
 
     def _parents(self) -> Iterator[FittedCandidates]:
         """Yield the sets to extend: those near the best, more where the best lacks something."""
-        best, *others = _best(self._found, BEAM)
+        best, *others = _best(self._found, SEARCH.extended)
         yield best
         lacking = self._size == 1 and not best.cells.adequate
         for other in others:
-            if lacking or other.log_posterior > best.log_posterior + np.log(NEARLY):
+            if lacking or other.log_posterior > best.log_posterior + np.log(SEARCH.near):
                 yield other
 
     def _beside(self, parent: FittedCandidates | None) -> Iterator[FittedCandidates]:
@@ -237,8 +227,8 @@ class ModelSearch:
         for candidate in _addable(parent):
             self._tally.begin(f"trying {candidate.effect.name}")
             begun.append(self.fitter.begin(parent, candidate, features))
-        promising = sorted((b for b in begun if b), key=lambda b: b.cost)[:FITTED]
-        self._tally.plan(len(promising) - FITTED)
+        promising = sorted((b for b in begun if b), key=lambda b: b.cost)[: SEARCH.fitted]
+        self._tally.plan(len(promising) - SEARCH.fitted)
         for beginning in promising:
             self._tally.begin(_fitting(beginning.candidates))
             if trial := self.fitter.fit(beginning):

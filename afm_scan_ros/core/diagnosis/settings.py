@@ -159,3 +159,64 @@ class DescentSettings:
 
 
 DESCENT = DescentSettings()
+
+
+@frozen
+class SearchSettings:
+    """Which sets of effects are fitted, and from when one is named."""
+
+    most_effects: int = setting(3, "1", "effects of a set, at most", "limits the work")
+    extended: int = setting(
+        3, "1", "sets of one size that are extended", "a beam search; limits the work"
+    )
+    fitted: int = setting(
+        6,
+        "1",
+        "candidates that are fitted beside a set, of all those with starting values",
+        "limits the work",
+    )
+    reweightings: int = setting(
+        2, "1", "fits, of which each has the weights that the one before left", "limits the work"
+    )
+    expected: float = setting(
+        0.5,
+        "1",
+        "effects that a scanner is expected to have beyond its model",
+        "a record is diagnosed where something may be amiss",
+    )
+    certain: float = setting(
+        0.95,
+        "1",
+        "probability from which on an effect is named, and that of the credible set",
+        "the usual level",
+    )
+    near: float = setting(
+        0.01,
+        "1",
+        "probability over that of the likeliest set, from which on a set is considered beside it",
+        "one in a hundred",
+    )
+    as_probable: float = setting(
+        0.05,
+        "1",
+        "probability over that of the likeliest form, from which on a simpler one is preferred",
+        "no form that the records exclude with 95 % certainty",
+    )
+    present: float = setting(
+        0.5,
+        "1",
+        "share of a tone's largest amplitude in any record from which on it counts as present",
+        "a disturbance that no drive causes is equally large in every record",
+    )
+    parts: int = setting(
+        4, "1", "parts of each record in which an effect is to have one amount", "limits the work"
+    )
+    largest_change: float = setting(
+        0.05,
+        "1",
+        "share of an effect's power by which its amount may differ from part to part",
+        "a fifth of its amount: a formula approximates the physics",
+    )
+
+
+SEARCH = SearchSettings()

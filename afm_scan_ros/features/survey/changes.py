@@ -28,7 +28,8 @@ import numpy as np
 import scipy
 from attrs import evolve, frozen
 
-from afm_scan_ros.core.diagnosis.axis_diagnosis import CERTAIN, FOUND
+from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM
 from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
@@ -94,7 +95,7 @@ class _Test:
         logs = np.log(np.where(known, self.deviation, 1.0)) + 0.5 * self.freedom * gain
         share = scipy.special.softmax(np.where(known, logs, -np.inf))
         ranked = np.argsort(-share)
-        held = ranked[: 1 + int(np.searchsorted(np.cumsum(share[ranked]), CERTAIN))]
+        held = ranked[: 1 + int(np.searchsorted(np.cumsum(share[ranked]), SEARCH.certain))]
         best = int(ranked[0])
         half = CONFIDENT * float(self.deviation[best])
         places = best + 1, int(held.min()) + 1, int(held.max()) + 1

@@ -7,7 +7,6 @@ from attrs import evolve
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
-    CERTAIN,
     FOUND,
     SUFFICIENT,
     AxisDiagnosis,
@@ -18,6 +17,7 @@ from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.result import WhyNot, alternatives, effects
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -106,7 +106,7 @@ def test_the_evidence_is_each_effect_s_own(healthy: Record) -> None:
     # With the drift in, the residual without the delay is that of the delay alone.
     for one in (delay, alone):
         assert one.evidence.rms_without > one.evidence.rms_with
-        assert one.probability > CERTAIN
+        assert one.probability > SEARCH.certain
     assert alone.evidence.nats > 10.0
     assert delay.evidence.rms_without == pytest.approx(alone.evidence.rms_without, rel=1e-3)
 

@@ -9,7 +9,6 @@ from attrs import frozen
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, valued
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
-    CERTAIN,
     FOUND,
     SUFFICIENT,
     UNEXPLAINED,
@@ -26,6 +25,7 @@ from afm_scan_ros.core.diagnosis.result import (
     joined,
 )
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.effect_type import EffectParameter
 from afm_scan_ros.core.effects.registry import changes_linearly, coupled_form
 from afm_scan_ros.core.identification.state_space.identify import CoupledSetting, identify_coupled
@@ -92,7 +92,7 @@ class CoupledDiagnosis:
 
     def _alternatives(self) -> Iterator[Alternative]:
         posterior, own = self.posterior, self.selected
-        credible, logs = posterior.credible(CERTAIN), posterior.logs
+        credible, logs = posterior.credible(SEARCH.certain), posterior.logs
         for names in [n for n in logs if n != own][:RUNNERS_UP]:
             trial = posterior.trials.get(names, posterior.trials[()])
             why = WhyNot.CREDIBLE if names in credible else WhyNot.LESS_PROBABLE
@@ -167,5 +167,5 @@ def verdict_of(posterior: SetPosterior) -> str:
         return UNEXPLAINED
     if not names:
         return SUFFICIENT
-    certain = all(posterior.of_effect(name) >= CERTAIN for name in names)
+    certain = all(posterior.of_effect(name) >= SEARCH.certain for name in names)
     return FOUND if certain else AMBIGUOUS

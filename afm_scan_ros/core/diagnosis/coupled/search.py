@@ -8,10 +8,10 @@ from attrs import frozen
 from scipy.special import logsumexp
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, elements_of, valued
-from afm_scan_ros.core.diagnosis.candidates import EXPECTED
 from afm_scan_ros.core.diagnosis.coupled.evidence import DiagnosedRecords, HeldOutLikelihood
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
-from afm_scan_ros.core.diagnosis.search import NEARLY, OUTSIDE, Names
+from afm_scan_ros.core.diagnosis.search import OUTSIDE, Names
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 from afm_scan_ros.core.effects.effect_type import Actuators
 from afm_scan_ros.core.effects.registry import COUPLED_EFFECTS, changes_linearly
 from afm_scan_ros.core.errors import ScanError
@@ -28,7 +28,7 @@ from afm_scan_ros.core.types import Array, ProgressCallback, Tally
 
 MOST = 2
 """Effects of a set."""
-LOG_ODDS = float(np.log(EXPECTED / len(COUPLED_EFFECTS)))
+LOG_ODDS = float(np.log(SEARCH.expected / len(COUPLED_EFFECTS)))
 
 
 @frozen(eq=False)
@@ -152,7 +152,7 @@ def _extended(trials: dict[Names, FittedSet], size: int, has: Names) -> Iterator
     """Yield the sets of a size that add an effect to the likely ones which have one less."""
     smaller = [trial for names, trial in trials.items() if len(names) == size - 1]
     best = max((trial.log_posterior for trial in smaller), default=np.inf)
-    parents = [t.names for t in smaller if t.log_posterior >= best + np.log(NEARLY)]
+    parents = [t.names for t in smaller if t.log_posterior >= best + np.log(SEARCH.near)]
     names = [effect.name for effect in COUPLED_EFFECTS if effect.name not in has]
     each = ((*parent, name) for parent in parents for name in names if name not in parent)
     yield from dict.fromkeys(tuple(sorted(one)) for one in each)

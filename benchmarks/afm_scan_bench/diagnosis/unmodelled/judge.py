@@ -7,12 +7,12 @@ from attrs import frozen
 from afm_scan_bench.diagnosis.unmodelled.cases import UnmodelledCase
 from afm_scan_ros.core.diagnosis.axis_diagnosis import (
     AMBIGUOUS,
-    CERTAIN,
     FOUND,
     INSUFFICIENT,
     UNEXPLAINED,
 )
 from afm_scan_ros.core.diagnosis.diagnosis import ScannerDiagnosis
+from afm_scan_ros.core.diagnosis.settings import SEARCH
 
 CORRECT, RESOLVED, UNRESOLVED = "correct", "resolved", "unresolved"
 WRONG, MISLEADING, PARTIAL = "wrong", "misleading", "partial"
@@ -43,7 +43,7 @@ class Statement:
             (name, axis)
             for axis, diagnosed in found.by_axis.items()
             if diagnosed.verdict == AMBIGUOUS
-            for names in diagnosed.selection.posterior.credible(CERTAIN)
+            for names in diagnosed.selection.posterior.credible(SEARCH.certain)
             for name in names
         )
         return cls(found.verdict, effects, effects | credible)
