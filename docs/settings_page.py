@@ -7,10 +7,16 @@ from attrs import fields
 from afm_scan_ros.core.diagnosis.settings import (
     DecimationSettings,
     DescentSettings,
+    EvidenceSettings,
+    InitialStateSettings,
+    LikelihoodSettings,
+    LimitSettings,
+    MismatchSettings,
     PartingSettings,
     PosteriorSettings,
     SearchSettings,
     StructureSettings,
+    VarianceSettings,
 )
 from afm_scan_ros.core.fit.settings import FitSettings
 from afm_scan_ros.core.intersample import IntersampleSettings
@@ -28,6 +34,12 @@ SETTINGS: tuple[type, ...] = (
     DecimationSettings,
     PosteriorSettings,
     SearchSettings,
+    VarianceSettings,
+    LikelihoodSettings,
+    EvidenceSettings,
+    LimitSettings,
+    InitialStateSettings,
+    MismatchSettings,
     StructureSettings,
     ExtensionSettings,
     DrawingSettings,

@@ -23,18 +23,14 @@ from afm_scan_ros.core.diagnosis.free_directions import with_free_directions
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals
 from afm_scan_ros.core.diagnosis.search import OUTSIDE, ModelSearch, Selection
-from afm_scan_ros.core.diagnosis.settings import PARTING, SEARCH
+from afm_scan_ros.core.diagnosis.settings import PARTING, SEARCH, VARIANCE
 from afm_scan_ros.core.diagnosis.structure import refit_of
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, TYPICAL_SHARE
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures, prominent_lines
 from afm_scan_ros.core.model import CONFIDENT, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import Array, Tally, floats
-
-ALONG = TYPICAL_SHARE / FREEDOM
-"""Power of a healthy residual along one influence, in detection limits squared."""
 
 
 def time_varying(
@@ -49,7 +45,8 @@ def time_varying(
         ]
         parts = [part for pair in zip(taken, left, strict=True) for part in _time_parts(*pair)]
         gained = sum(_explained_power(part) for part in parts) - _explained_power(np.hstack(parts))
-        allowed = CONFIDENT**2 * ALONG * len(evidence) + SEARCH.largest_change * _power(taken)
+        by_chance = CONFIDENT**2 * VARIANCE.along * len(evidence)
+        allowed = by_chance + SEARCH.largest_change * _power(taken)
         if gained > allowed:
             yield place
 
@@ -66,7 +63,7 @@ def _explained_power(part: Array) -> float:
     excited in a part explains nothing there.
     """
     taken, left = part
-    return float(taken @ left) ** 2 / (float(taken @ taken) + ALONG)
+    return float(taken @ left) ** 2 / (float(taken @ taken) + VARIANCE.along)
 
 
 def _power(taken: Sequence[Array]) -> float:
@@ -147,7 +144,7 @@ class AxisDiagnosis:
         selected, reached = self.selection.selected, self.selection.reached
         if selected is None:
             return reached.adequate
-        reached = evolve(reached, known=np.maximum(reached.known, KNOWN_FREEDOM))
+        reached = evolve(reached, known=np.maximum(reached.known, VARIANCE.known))
         if selected.at_end:
             exact = np.concatenate([each.variance.total for each in self.evidence])
             reached = evolve(reached, variance=exact)

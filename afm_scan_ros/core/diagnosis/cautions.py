@@ -15,14 +15,10 @@ from scipy.signal import correlate
 
 from afm_scan_ros.core.bands import weighted
 from afm_scan_ros.core.diagnosis.axis_diagnosis import SUFFICIENT, AxisDiagnosis
-from afm_scan_ros.core.diagnosis.discrepancy import (
-    AT_LIMIT,
-    MotionByBand,
-    places_moved,
-    tested_motion,
-)
+from afm_scan_ros.core.diagnosis.discrepancy import MotionByBand, places_moved, tested_motion
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.settings import LIMIT, MISMATCH
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import length_scale
 from afm_scan_ros.core.effects.vibration import VibrationModel, first_resonance
@@ -32,25 +28,6 @@ from afm_scan_ros.core.model import AxisModel, ModelDiscrepancy, ScannerModel
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scanner import chain_of, predict
 from afm_scan_ros.core.types import AXES, Array, Trace
-
-VISIBLE, UNIT = 1e-7, 100.0
-"""Rms of predicted motion, m on the reference scanner, below which drift or noise may exceed it.
-
-Such a record contradicts the model only if it correlates with the prediction, without its slow
-trend, at so large a gain."""
-SLOW_SHARE = 3
-"""Degree of the polynomial that describes a record's slow trend."""
-SLOW = 0.5
-"""Share of the first resonance's frequency below which a stage moves as at rest, within a third."""
-LEAST_SLOW = 0.03
-"""Least share of the motion below the resonance by which records are compared there alone."""
-GAIN_RANGE = (0.5, 2.0)
-"""Gains of the same motion in one unit; motion of another shape may be far smaller."""
-LEAST_LOOP, BACKWARD = 0.01, 0.5
-"""Area of a loop that tells its sense, and the share of it that measured loops have backward."""
-SAME_SHAPE, LEAST_CORRELATION = 0.95, 0.7
-"""Correlation of predicted and measured motion from which on they are of one shape, and the least
-that they have at some delay: a slew limit makes motion small and late."""
 
 
 def refuse_mismatch(model: ScannerModel, observed: Record) -> None:
@@ -73,9 +50,9 @@ def refuse_mismatch(model: ScannerModel, observed: Record) -> None:
         signals = predicted[axis], measured
         if slow is not None:
             moved = weighted(predicted[axis], slow)
-            if float(moved.std()) >= LEAST_SLOW * float(predicted[axis].std()):
+            if float(moved.std()) >= MISMATCH.least_slow * float(predicted[axis].std()):
                 signals = moved, weighted(measured, slow)
-        visible = VISIBLE * length_scale(model.axis(axis))
+        visible = MISMATCH.visible * length_scale(model.axis(axis))
         _refuse_unlike(f"{observed.name}: axis {axis}", *signals, visible)
         if float(signals[0].std()) >= visible:
             _refuse_backward(f"{observed.name}: axis {axis}", drive, *signals)
@@ -87,7 +64,7 @@ def _below_resonance(stage: VibrationModel, period: float, count: int) -> Array 
     A resonance that moved changes the motion about it by far more than half.
     """
     try:
-        highest = SLOW * first_resonance(stage).frequency
+        highest = MISMATCH.slow * first_resonance(stage).frequency
     except InputError:
         return None
     return np.asarray(np.arange(count) / (2.0 * count * period) < highest, dtype=np.float64)
@@ -110,11 +87,11 @@ def _rest(model: ScannerModel, axis: str) -> float:
 
 def _refuse_unlike(where: str, predicted: Array, measured: Array, least: float) -> None:
     visible = float(predicted.std()) >= least
-    gain, likeness = _compared(predicted, measured, degree=0 if visible else SLOW_SHARE)
-    if not visible and (abs(gain) < UNIT or abs(likeness) < LEAST_CORRELATION):
+    gain, likeness = _compared(predicted, measured, degree=0 if visible else MISMATCH.slow_degree)
+    if not visible and (abs(gain) < MISMATCH.unit or abs(likeness) < MISMATCH.least_correlation):
         return
-    least_gain, largest_gain = GAIN_RANGE
-    other_shape = visible and measured.any() and abs(likeness) < SAME_SHAPE
+    least_gain, largest_gain = 1.0 / MISMATCH.gain_factor, MISMATCH.gain_factor
+    other_shape = visible and measured.any() and abs(likeness) < MISMATCH.same_shape
     if gain > largest_gain or (gain < least_gain and not other_shape):
         raise InputError(
             f"{where} moves {gain:.3g} times as far as the model says: it is of another scanner"
@@ -122,7 +99,7 @@ def _refuse_unlike(where: str, predicted: Array, measured: Array, least: float) 
             " and displacement in m"
         )
     delayed = _largest_correlation(predicted, measured) if other_shape else likeness
-    if delayed < LEAST_CORRELATION:
+    if delayed < MISMATCH.least_correlation:
         raise InputError(
             f"{where} moves unlike the model (correlation {delayed:.2f} at best): it is of another"
             " scanner or axis; give the model of this scanner"
@@ -132,7 +109,7 @@ def _refuse_unlike(where: str, predicted: Array, measured: Array, least: float) 
 def _refuse_backward(where: str, drive: Array, predicted: Array, measured: Array) -> None:
     """Refuse motion that is ahead of its drive, where the prediction is behind: it gives energy."""
     lost, found = (_lost(drive[: len(moved)], moved) for moved in (predicted, measured))
-    if lost > LEAST_LOOP and found < -BACKWARD * lost:
+    if lost > MISMATCH.least_loop and found < -MISMATCH.backward * lost:
         raise InputError(
             f"{where} goes round its loops backward: its drive and displacement columns are"
             " exchanged; name them the other way round"
@@ -162,10 +139,6 @@ def _compared(predicted: Array, measured: Array, degree: int) -> tuple[float, fl
     return gain, gain * float(np.sqrt(strength / max(float(seen @ seen), np.finfo(float).tiny)))
 
 
-SEVERAL_RATES = 10.0
-"""Ratio of the highest to the lowest frequency of the motion that counts as several rates."""
-
-
 def single_rate_band(known: Sequence[ModelDiscrepancy]) -> tuple[float, float] | None:
     """Band (Hz) of the only rate at which a model's error is known.
 
@@ -175,7 +148,7 @@ def single_rate_band(known: Sequence[ModelDiscrepancy]) -> tuple[float, float] |
     if not moved:
         return None
     low, high = min(low for low, _ in moved), max(high for _, high in moved)
-    return None if high >= SEVERAL_RATES * min(end for _, end in moved) else (low, high)
+    return None if high >= MISMATCH.several_rates * min(end for _, end in moved) else (low, high)
 
 
 def _rates_moved(record: ModelDiscrepancy) -> list[tuple[float, float]]:
@@ -250,7 +223,7 @@ def _above(axis: str, diagnosed: AxisDiagnosis) -> Iterator[Caution]:
     left = zip(diagnosed.evidence, diagnosed.ratio_after, strict=True)
     evidence, ratio = max(left, key=lambda each: float(each[1].max()))
     band = int(ratio.argmax())
-    if ratio[band] >= AT_LIMIT:
+    if ratio[band] >= LIMIT.expected:
         low, high = evidence.limit.edges[band : band + 2]
         name, others = evidence.playback.view.name, len(diagnosed.evidence) > 1
         yield AboveDetectionLimit(axis, name, float(ratio[band]), low, high, others)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.bands import rms_by_band, spread
 from afm_scan_ros.core.chain import RATE_INDEPENDENT, Chain
 from afm_scan_ros.core.diagnosis.records import Playback
+from afm_scan_ros.core.diagnosis.settings import LIMIT
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface
 from afm_scan_ros.core.model import (
     VIBRATING,
@@ -34,20 +35,6 @@ from afm_scan_ros.core.model import (
 from afm_scan_ros.core.spread import Spread
 from afm_scan_ros.core.types import Array, floats
 
-AT_LIMIT = 1.8
-"""Largest ratio of a band's rms to its detection limit that is as expected."""
-MISSED_FACTOR = 1.5
-"""Factor of the error over the known share, where unmodelled modes dominate it."""
-HARMONIC_SHARE = 0.5
-"""Largest share of a slow motion's error in the harmonics, in the band above it."""
-FIRST_CYCLES, UNPREPARED_FACTOR = 3.0, 3.0
-"""First cycles of a record without a preparation, and the factor of its error there."""
-LEAST_MOVED = 0.2
-"""Least share of a record's largest band that counts as motion in a band. The harmonics of a
-triangle, at most a ninth, are no further rate."""
-ALIKE = 2.0**0.5
-"""Largest ratio of two motions of one kind in a band. The error of hysteresis grows at most with
-the square of a small amplitude, so in proportion it errs by less than ``AT_LIMIT``."""
 SMALLEST = 1e-15
 """m; added to a motion, so that a record at rest has a logarithm."""
 
@@ -88,8 +75,8 @@ class DetectionLimit:
         state in one step, which lies in the bands of the first few cycles. A scan is prepared by
         such moves and has no such step.
         """
-        stepped = np.array(self.edges[:-1]) < FIRST_CYCLES / duration
-        return evolve(self, rms=np.where(stepped, UNPREPARED_FACTOR, 1.0) * self.rms)
+        stepped = np.array(self.edges[:-1]) < LIMIT.first_cycles / duration
+        return evolve(self, rms=np.where(stepped, LIMIT.unprepared_factor, 1.0) * self.rms)
 
     def sampled(self, sample_period: float) -> "DetectionLimit":
         """Detection limit of the same record at a longer sample period (s), noise folded."""
@@ -143,7 +130,7 @@ def moves_alike(known: Sequence[ModelDiscrepancy], edges: Array, moved: Array) -
 
 def places_moved(moved: Array) -> NDArray[np.intp]:
     """Places of the bands that hold motion, of one that moves ``moved`` (bands,) in m rms."""
-    return np.flatnonzero((moved > 0.0) & (moved >= LEAST_MOVED * moved.max()))
+    return np.flatnonzero((moved > 0.0) & (moved >= LIMIT.least_moved * moved.max()))
 
 
 def _vibrating(edges: Array, resonance: float) -> NDArray[np.bool_]:
@@ -168,8 +155,8 @@ def _of_other_motion(
     least = np.min([part.of_whole(moved) for part in parts], axis=0)
     error = np.hypot(np.maximum(_of_motion(parts, moved), least), stated)
     for above in 1 + np.flatnonzero(~vibrating[:-1]):
-        error[above] = max(error[above], HARMONIC_SHARE * error[above - 1])
-    missed = MISSED_FACTOR * np.max([part.shares for part in parts], axis=0) * moved
+        error[above] = max(error[above], LIMIT.harmonic_share * error[above - 1])
+    missed = LIMIT.missed_factor * np.max([part.shares for part in parts], axis=0) * moved
     return np.asarray(np.where(vibrating, np.maximum(error, missed), error))
 
 
@@ -212,12 +199,12 @@ class _BandDiscrepancy:
         own = self.displacement
         counts = np.union1d(places_moved(moved), places_moved(own))
         larger, smaller = (which(moved, own)[counts] for which in (np.maximum, np.minimum))
-        return bool(np.all(larger <= ALIKE * smaller))
+        return bool(np.all(larger <= LIMIT.alike * smaller))
 
     @property
     def moving(self) -> NDArray[np.bool_]:
         """Whether the record moved in each band, (bands,)."""
-        least = max(LEAST_MOVED * self.displacement.max(), 2.0 * SMALLEST)
+        least = max(LIMIT.least_moved * self.displacement.max(), 2.0 * SMALLEST)
         return np.asarray(self.displacement >= least)
 
     @property
@@ -323,7 +310,7 @@ def untested_motion(
         return None
     motion, tested = MotionByBand.of(edges, moved), tested_motion(known)
     within = tested and (
-        motion.size * ALIKE >= tested.size
+        motion.size * LIMIT.alike >= tested.size
         and motion.low >= tested.low
         and motion.high <= tested.high
     )

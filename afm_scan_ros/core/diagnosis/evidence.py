@@ -19,18 +19,13 @@ from numpy.typing import NDArray
 from afm_scan_ros.core.bands import fast_length, rms_by_band, weighted
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.cells import RecordCells
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit, MotionByBand
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit, MotionByBand
 from afm_scan_ros.core.diagnosis.records import Playback
-from afm_scan_ros.core.diagnosis.settings import DECIMATION
+from afm_scan_ros.core.diagnosis.settings import DECIMATION, EVIDENCE, LIMIT, VARIANCE
 from afm_scan_ros.core.diagnosis.tones import lasting_lines
-from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM, UNTESTED_FREEDOM, CellVariance
+from afm_scan_ros.core.diagnosis.variance import CellVariance
 from afm_scan_ros.core.effects.periodic_disturbance import undisturbed
 from afm_scan_ros.core.types import Array
-
-LEAST_MOTION = 100.0
-"""Peak-to-peak motion over the sensor's noise, below which a record shows nothing of a model."""
-STRETCHES = 16
-"""Stretches of a record; half of them are for fitting."""
 
 
 @frozen(eq=False, slots=False)
@@ -77,12 +72,12 @@ class Evidence:
     @fitted.default
     def _by_turns(self) -> NDArray[np.bool_]:
         count = len(self.playback.view.measured)
-        return np.asarray(np.arange(count) * STRETCHES // count % 2 == 0)
+        return np.asarray(np.arange(count) * EVIDENCE.stretches // count % 2 == 0)
 
     @property
     def known_from(self) -> float:
         """Amplitudes from which the model's error is known."""
-        return UNTESTED_FREEDOM if self.untested else KNOWN_FREEDOM
+        return VARIANCE.untested if self.untested else VARIANCE.known
 
     def with_cells(self, cells: RecordCells, chain: Chain) -> "Evidence":
         """The same evidence by other cells, with the variance that a chain's residual tells."""
@@ -116,7 +111,7 @@ class Evidence:
     def still(self, chain: Chain) -> bool:
         """Whether a chain moves too little for the record to show anything of it."""
         moved = np.ptp(self.playback.displacement(chain))
-        return bool(moved <= LEAST_MOTION * np.linalg.norm(self.limit.noise))
+        return bool(moved <= EVIDENCE.least_motion * np.linalg.norm(self.limit.noise))
 
     def residual(self, chain: Chain) -> Array:
         """Measured minus predicted displacement (n,) in m, without its mean."""
@@ -217,5 +212,5 @@ def _same(evidence: Evidence, fewer: Evidence, chain: Chain) -> bool:
         evidence.lasting_lines(chain),
     )
     below = max(lines, default=0.0) < limit.edges[-1]
-    quiet = bool(evidence.ratio(chain)[unseen].max() < AT_LIMIT)
+    quiet = bool(evidence.ratio(chain)[unseen].max() < LIMIT.expected)
     return bool(differs.max() < DECIMATION.equal_within) and quiet and below

@@ -24,10 +24,9 @@ from attrs import frozen
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.axis_diagnosis import AxisDiagnosis
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.search import OUTSIDE
-from afm_scan_ros.core.diagnosis.settings import SEARCH
+from afm_scan_ros.core.diagnosis.settings import LIKELIHOOD, SEARCH
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.scale import half_range_of
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
@@ -249,7 +248,7 @@ def _expected(seen: Evidence, base: Chain, credible: Sequence[Hypothesis]) -> tu
         for own, each in zip(moved, credible, strict=True)
         for near in each.deviated
     ]
-    of, formula = seen.variance, max(FORMULA_ERRORS) ** 2
+    of, formula = seen.variance, LIKELIHOOD.formula_error**2
     all_moved = seen.cells.along(np.array(moved + changed))
     return information(
         seen.cells.products(all_moved, all_moved),

@@ -30,13 +30,10 @@ from scipy.special import logsumexp, softmax
 
 from afm_scan_ros.core.chain import Chain
 from afm_scan_ros.core.diagnosis.evidence import Evidence
-from afm_scan_ros.core.diagnosis.settings import POSTERIOR
+from afm_scan_ros.core.diagnosis.settings import LIKELIHOOD, POSTERIOR
 from afm_scan_ros.core.diagnosis.variance import log_density, weights
 from afm_scan_ros.core.types import Array
 
-ROUNDS = 50
-PRECISION = 1e-6
-"""Change, in standard deviations, that ends the search."""
 Weights = Callable[[Array], Array]
 """Minus twice the slope (cells,) of the log density over the mean squares (cells,)."""
 
@@ -69,25 +66,15 @@ class LinearResidual:
     def profiled(self, weights: Weights) -> Profile:
         """Most likely deviations."""
         here: Array = np.zeros(self.slope.shape[1])
-        for _ in range(ROUNDS):
+        for _ in range(LIKELIHOOD.rounds):
             weight = weights(self.at(here))
             inner = np.eye(len(here)) + np.tensordot(weight, self.gram, 1)
             there = np.asarray(np.linalg.solve(inner, weight @ self.slope), dtype=np.float64)
-            if np.all(np.abs(there - here) <= PRECISION):
+            if np.all(np.abs(there - here) <= LIKELIHOOD.precision):
                 break
             here = there
         volume = -0.5 * float(np.linalg.slogdet(inner)[1])
         return Profile(there, self.at(there), volume - 0.5 * float(there @ there))
-
-
-FORMULA_ERRORS = 0.0, 0.1
-"""Relative errors r of an effect's displacement, each as likely."""
-REMARKABLE = 0.01
-"""Probability of a larger residual in a cell, below which effects are searched for."""
-SIZES = 64
-"""Points of an integral over the size of something that no effect describes."""
-FALSE_LACK = 0.01
-"""False discovery rate of the lack-of-fit test over the cells."""
 
 
 @frozen(eq=False)
@@ -117,7 +104,7 @@ class CellFit:
         ``least`` is the variance without that of an effect's inexact formula. No direction is
         free.
         """
-        variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        variances = [least + share**2 * added for share in (0.0, LIKELIHOOD.formula_error)]
         zero = np.sum(log_density(np.zeros_like(least), least, known, freedom))
         sums = [np.sum(log_density(power, each, known, freedom)) for each in variances]
         logs = np.array(sums) - zero
@@ -132,19 +119,19 @@ class CellFit:
 
     @property
     def lacking(self) -> NDArray[np.bool_]:
-        """Cells (cells,) whose residual is too large, at a false discovery rate of FALSE_LACK.
+        """Cells (cells,) whose residual is too large, at a false discovery rate of ``false_lack``.
 
         By the procedure of Benjamini and Hochberg (J. R. Stat. Soc. B 57, 1995, 289).
         """
         tail = self.tail
         ranked = np.sort(tail)
-        below = ranked[ranked <= FALSE_LACK * np.arange(1, len(tail) + 1) / len(tail)]
+        below = ranked[ranked <= LIKELIHOOD.false_lack * np.arange(1, len(tail) + 1) / len(tail)]
         return np.asarray(tail <= below[-1]) if len(below) else np.zeros(len(tail), dtype=bool)
 
     @property
     def unremarkable(self) -> bool:
         """Whether no cell alone makes a search for effects necessary."""
-        return not np.any(self.tail < REMARKABLE)
+        return not np.any(self.tail < LIKELIHOOD.remarkable)
 
     @property
     def adequate(self) -> bool:
@@ -183,13 +170,15 @@ class Outside:
     def beyond(cls, fit: CellFit, most: Array) -> "Outside":
         """Variances beyond those of a fit, uniform in the logarithm up to ``most`` (cells,), m²."""
         ratio = np.maximum(most / fit.variance, math.e)
-        more = fit.variance * (1.0 + ratio ** np.linspace(0.0, 1.0, SIZES)[:, np.newaxis])
+        more = fit.variance * (
+            1.0 + ratio ** np.linspace(0.0, 1.0, LIKELIHOOD.sizes)[:, np.newaxis]
+        )
         return cls(fit.variance, more, fit.known, fit.freedom)
 
     def log_evidence(self, power: Array) -> float:
         """Log evidence of mean squares (cells,), relative to a residual of zero without it."""
         zero = log_density(np.zeros_like(power), self.variance, self.known, self.freedom).sum()
-        return float(logsumexp(self._cells(power)[0].sum(axis=1)) - np.log(SIZES) - zero)
+        return float(logsumexp(self._cells(power)[0].sum(axis=1)) - np.log(LIKELIHOOD.sizes) - zero)
 
     def weights(self, power: Array) -> Array:
         """Minus twice the slope (cells,) of the log evidence."""
@@ -204,8 +193,8 @@ class Outside:
         """Log evidence (shares, cells) of each cell, and its part with something there."""
         known = log_density(power, self.variance, self.known, self.freedom)
         sizes = log_density(power, self.more, self.known, self.freedom)
-        there = logsumexp(sizes, axis=0) - np.log(SIZES)
-        shares = (np.arange(SIZES)[:, np.newaxis] + 0.5) / SIZES
+        there = logsumexp(sizes, axis=0) - np.log(LIKELIHOOD.sizes)
+        shares = (np.arange(LIKELIHOOD.sizes)[:, np.newaxis] + 0.5) / LIKELIHOOD.sizes
         present = np.log(shares) + there
         return np.logaddexp(np.log1p(-shares) + known, present), present
 
@@ -223,7 +212,7 @@ class Likelihood:
         power = self._power(left)
         added = self._power([one - other for one, other in zip(left, self._without, strict=True)])
         least, known, freedom = self._of_cells
-        variances = [least + share**2 * added for share in FORMULA_ERRORS]
+        variances = [least + share**2 * added for share in (0.0, LIKELIHOOD.formula_error)]
         residual = self._linear(power, left)
         fits = [
             residual.profiled(partial(weights, variance=v, known=known, freedom=freedom))

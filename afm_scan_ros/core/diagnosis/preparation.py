@@ -21,7 +21,7 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
     error_between_levels,
     untested_motion,
 )
-from afm_scan_ros.core.diagnosis.evidence import LEAST_MOTION, Evidence
+from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.records import (
     DEPOLARISED,
     AxisSignals,
@@ -29,6 +29,7 @@ from afm_scan_ros.core.diagnosis.records import (
     Playback,
     repetition_rates,
 )
+from afm_scan_ros.core.diagnosis.settings import EVIDENCE, INITIAL_STATE
 from afm_scan_ros.core.effects.scale import resonance_of
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.periods import repeated_part
@@ -38,14 +39,8 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.trajectory import phases
 from afm_scan_ros.core.types import AXES, Array
 
-WITHIN_NOISE = 2.0
-"""Mean square per band, in detection limits, up to which the depolarised state is kept."""
-MUCH_BETTER = 0.2
-"""Share of the depolarised state's misfit that another state must fall below."""
-LEVELS, INNER = 8, (0.0, 0.4, 0.7, 1.0)
-"""Extremes tried on either side, and the second extreme's share of the first."""
-REFINEMENTS = 150
-FEWEST_SAMPLES = 2000
+INNER = (0.0, 0.4, 0.7, 1.0)
+"""Shares of the first extreme that are tried as the second."""
 
 
 def estimate_initial_state(
@@ -64,10 +59,10 @@ def estimate_initial_state(
 
     limits = surface.drive_range
     before = misfit(DEPOLARISED)
-    if before > WITHIN_NOISE * len(limit.rms):
+    if before > INITIAL_STATE.within_noise * len(limit.rms):
         start = min(_candidate_states(limits, float(view.drive[0])), key=misfit)
         best = _refined_state(start, misfit, limits)
-        if misfit(best) < MUCH_BETTER * before:
+        if misfit(best) < INITIAL_STATE.much_better * before:
             return best
     return DEPOLARISED
 
@@ -75,7 +70,7 @@ def estimate_initial_state(
 def _opening(view: AxisSignals) -> AxisSignals:
     """Return the first part of a record: 1.5 times as long as to its second drive extreme."""
     last = max(int(view.drive.argmin()), int(view.drive.argmax()))
-    count = min(len(view.drive), max(FEWEST_SAMPLES, 3 * last // 2))
+    count = min(len(view.drive), max(INITIAL_STATE.fewest_samples, 3 * last // 2))
     return view.part(count)
 
 
@@ -83,7 +78,7 @@ def _candidate_states(limits: tuple[float, float], rest: float) -> Iterator[Init
     """Yield excursions to either side, some followed by a smaller one to the other side."""
     yield InitialState((), rest)
     for limit, opposite in (limits, limits[::-1]):
-        for size in np.linspace(0.0, 1.0, LEVELS + 1)[1:]:
+        for size in np.linspace(0.0, 1.0, INITIAL_STATE.levels + 1)[1:]:
             for share in INNER:
                 turns = np.array([size * limit, *((share * size * opposite,) if share else ())])
                 yield InitialState(np.clip(turns, *limits), rest)
@@ -104,7 +99,10 @@ def _refined_state(
         first,
         method="Nelder-Mead",
         bounds=[limits] * len(first),
-        options={"maxfev": REFINEMENTS, "initial_simplex": np.vstack([first, first + steps])},
+        options={
+            "maxfev": INITIAL_STATE.refinements,
+            "initial_simplex": np.vstack([first, first + steps]),
+        },
     )
     return initial_state(found.x)
 
@@ -186,7 +184,7 @@ def _untested(
 ) -> MotionByBand | None:
     """Motion at which the error is not known; none of a record that hardly moves."""
     moved = playback.displacement(chain)
-    if np.ptp(moved) <= LEAST_MOTION * np.linalg.norm(limit.noise):
+    if np.ptp(moved) <= EVIDENCE.least_motion * np.linalg.norm(limit.noise):
         return None
     return untested_motion(known, moved, playback.view.sample_period, limit.resonance)
 

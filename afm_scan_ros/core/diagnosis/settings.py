@@ -220,3 +220,230 @@ class SearchSettings:
 
 
 SEARCH = SearchSettings()
+
+
+@frozen
+class VarianceSettings:
+    """Amplitudes of the model's discrepancy in a band, fitted to healthy scans."""
+
+    freedom: float = setting(
+        1.4,
+        "1",
+        "independent amplitudes of the discrepancy in a band, nu",
+        "drawn scanners give 1.1",
+    )
+    known: float = setting(
+        8.0,
+        "1",
+        "amplitudes that a tested discrepancy is known from, kappa",
+        "drawn scanners give 9.7",
+    )
+    untested: float = setting(
+        2.0, "1", "the same where no record tests such motion", "drawn scanners give 1.9"
+    )
+    typical_share: float = setting(
+        0.3,
+        "1",
+        "mean square of the discrepancy over its detection limit's, an upper bound, c",
+        "drawn scanners give 0.30",
+    )
+
+    @property
+    def along(self) -> float:
+        """Power of a healthy residual along one influence, in detection limits squared."""
+        return self.typical_share / self.freedom
+
+
+VARIANCE = VarianceSettings()
+
+
+@frozen
+class LikelihoodSettings:
+    """What an effect's formula may miss, and what a residual lacks."""
+
+    formula_error: float = setting(
+        0.1,
+        "1",
+        "relative error of an effect's formula, as likely as none, rho",
+        "a formula approximates physics",
+    )
+    remarkable: float = setting(
+        0.01,
+        "1",
+        "probability of a larger residual in a cell, below which effects are searched for",
+        "one healthy cell in a hundred starts a search",
+    )
+    false_lack: float = setting(
+        0.01, "1", "false discovery rate of the lack-of-fit test over the cells", "the usual level"
+    )
+    rounds: int = setting(50, "1", "steps to the likeliest deviations, at most", "limits the work")
+    precision: float = setting(
+        1e-6, "1", "change, in standard deviations, that ends them", "far below one"
+    )
+    sizes: int = setting(
+        64,
+        "1",
+        "points of an integral over the size of something that no effect describes",
+        "limits the work",
+    )
+
+
+LIKELIHOOD = LikelihoodSettings()
+
+
+@frozen
+class EvidenceSettings:
+    """When a record shows anything of a model, and what of it is held out."""
+
+    least_motion: float = setting(
+        100.0,
+        "1",
+        "peak-to-peak motion over noise, below which a record shows nothing of a model",
+        "a model's error of one per cent is as large as the noise there",
+    )
+    stretches: int = setting(
+        16, "1", "stretches of a record, of which every other one is held out", "eight of each"
+    )
+
+
+EVIDENCE = EvidenceSettings()
+
+
+@frozen
+class LimitSettings:
+    """How large a residual the model's known error explains."""
+
+    expected: float = setting(
+        1.8,
+        "1",
+        "ratio of a band's rms to its detection limit up to which it is as expected",
+        "less than one healthy band in a hundred exceeds it: 0.3 F(1.4, 8)",
+    )
+    missed_factor: float = setting(
+        1.5,
+        "1",
+        "factor of the error above two thirds of the first resonance",
+        "modes that no model has dominate it there",
+    )
+    harmonic_share: float = setting(
+        0.5,
+        "1",
+        "share of a slow motion's error in the band above it, at most",
+        "an error of a slow motion has harmonics at higher frequencies",
+    )
+    first_cycles: float = setting(
+        3.0,
+        "1",
+        "first cycles of a record without a preparation",
+        "they hold branches that come once",
+    )
+    unprepared_factor: float = setting(
+        3.0, "1", "factor of the error there", "branches that come once were not identified"
+    )
+    least_moved: float = setting(
+        0.2,
+        "1",
+        "share of a record's largest band that counts as motion in a band",
+        "harmonics of a triangle, at most a ninth, are no further rate",
+    )
+    alike: float = setting(
+        2.0**0.5,
+        "1",
+        "ratio of two motions in each band up to which they are of one kind",
+        "the error of hysteresis grows at most with the square of a small amplitude",
+    )
+
+
+LIMIT = LimitSettings()
+
+
+@frozen
+class InitialStateSettings:
+    """When a record began in another state than depolarised."""
+
+    within_noise: float = setting(
+        2.0,
+        "1",
+        "mean square per band, in detection limits, up to which the depolarised state is kept",
+        "such a residual needs no other state",
+    )
+    much_better: float = setting(
+        0.2,
+        "1",
+        "share of the depolarised state's misfit that another state must fall below",
+        "an effect may look like a state",
+    )
+    levels: int = setting(8, "1", "extremes tried on either side", "limits the work")
+    refinements: int = setting(150, "1", "evaluations that refine the best", "limits the work")
+    fewest_samples: int = setting(
+        2000, "samples", "of a record that the states are tried on, at least", "limits the work"
+    )
+
+
+INITIAL_STATE = InitialStateSettings()
+
+
+@frozen
+class MismatchSettings:
+    """When a record cannot be the model's."""
+
+    visible: float = setting(
+        1e-7,
+        "m on the reference scanner",
+        "rms of predicted motion below which drift or noise may exceed it",
+        "drift and noise of such records reach it",
+    )
+    unit: float = setting(
+        100.0,
+        "1",
+        "gain at which a record that hardly moves contradicts the model",
+        "a wrong unit is a factor of a thousand",
+    )
+    slow_degree: int = setting(
+        3,
+        "1",
+        "degree of the polynomial that describes such a record's slow trend",
+        "drift is smooth",
+    )
+    slow: float = setting(
+        0.5,
+        "1",
+        "frequency over the first resonance, below which a stage moves as at rest",
+        "a resonance adds a third there",
+    )
+    least_slow: float = setting(
+        0.03,
+        "1",
+        "share of slow motion from which on records are compared there alone",
+        "smaller motion may be drift",
+    )
+    gain_factor: float = setting(
+        2.0,
+        "1",
+        "ratio of gains of the same motion in one unit, either way",
+        "piezoelectric gains vary less",
+    )
+    same_shape: float = setting(
+        0.95,
+        "1",
+        "correlation from which on two motions are of one shape",
+        "they differ by their loops alone",
+    )
+    least_correlation: float = setting(
+        0.7, "1", "correlation at some delay, at least", "a slew limit makes motion small and late"
+    )
+    least_loop: float = setting(
+        0.01,
+        "1",
+        "area of a loop, of its rectangle, that shows its sense",
+        "a smaller one may be noise",
+    )
+    backward: float = setting(
+        0.5, "1", "share of it that measured loops have backward", "half of what the model has"
+    )
+    several_rates: float = setting(
+        10.0, "1", "ratio of frequencies of the motion that counts as several rates", "a decade"
+    )
+
+
+MISMATCH = MismatchSettings()

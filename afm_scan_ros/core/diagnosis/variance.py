@@ -22,17 +22,9 @@ from scipy.stats import chi2, f
 
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import SMALLEST, DetectionLimit
-from afm_scan_ros.core.diagnosis.settings import PARTING
+from afm_scan_ros.core.diagnosis.settings import PARTING, VARIANCE
 from afm_scan_ros.core.diagnosis.tones import without_tones
 from afm_scan_ros.core.types import Array
-
-FREEDOM, KNOWN_FREEDOM, UNTESTED_FREEDOM = 1.4, 8.0, 2.0
-"""Independent amplitudes of the discrepancy in a band, n, and those from which it is known, k.
-
-The last is k where the discrepancy is known from other motion, or from fitted records alone.
-"""
-TYPICAL_SHARE = 0.3
-"""Mean square of the discrepancy over its detection limit, which is an upper bound."""
 
 
 def satterthwaite(one: Array, other: Array, of_one: Array | float, of_other: float) -> Array:
@@ -57,13 +49,13 @@ class CellVariance:
         """Return that of a record that moves, by band; the discrepancy is known as ``tested``."""
         noise, error = _parts(limit)
         few = np.ones_like(noise)
-        return cls(noise + error, noise, FREEDOM * few, tested * few)
+        return cls(noise + error, noise, VARIANCE.freedom * few, tested * few)
 
     @classmethod
     def of_noise(cls, noise: Array, error: Array, counts: Array, tested: float) -> "CellVariance":
         """Return that of noise of so many amplitudes, and an error (cells,) of few, both in m²."""
-        freedom = satterthwaite(noise, error, counts, FREEDOM)
-        known = satterthwaite(noise, error, KNOWN_FREEDOM, tested)
+        freedom = satterthwaite(noise, error, counts, VARIANCE.freedom)
+        known = satterthwaite(noise, error, VARIANCE.known, tested)
         return cls(noise + error, noise, freedom, known)
 
     @classmethod
@@ -91,14 +83,14 @@ class CellVariance:
         counts = cells.counts.reshape(2, cells.bands)
         of_motion, of_rest = counts / counts.sum(axis=0) * noise
         power, seen = between_power(cells, residual, of_rest)
-        most = error * f.isf(PARTING.false_alarm, FREEDOM, tested)
+        most = error * f.isf(PARTING.false_alarm, VARIANCE.freedom, tested)
         beyond = np.clip(power - seen, shares * error, most)
         rest = cls.of_noise(seen, beyond, counts[1], tested)
         few = np.ones(cells.bands)
         return cls(
             np.append(of_motion + (1.0 - shares) * error, rest.total),
             np.append(of_motion, rest.noise),
-            np.append(FREEDOM * few, rest.freedom),
+            np.append(VARIANCE.freedom * few, rest.freedom),
             np.append(tested * few, rest.known),
         )
 
@@ -114,7 +106,7 @@ class CellVariance:
 
 def _parts(limit: DetectionLimit) -> tuple[Array, Array]:
     """Variance (bands,) of noise and of discrepancy, m²."""
-    error = TYPICAL_SHARE * np.maximum(limit.rms**2 - limit.noise**2, 0.0)
+    error = VARIANCE.typical_share * np.maximum(limit.rms**2 - limit.noise**2, 0.0)
     return np.maximum(limit.noise, SMALLEST) ** 2, np.asarray(error)
 
 

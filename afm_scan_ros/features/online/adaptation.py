@@ -23,9 +23,9 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.monitor import expected_limits
 from afm_scan_ros.core.diagnosis.scan_monitor import ScanNews
+from afm_scan_ros.core.diagnosis.settings import LIMIT
 from afm_scan_ros.core.model import ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.types import AXES, Array, Trace
@@ -138,7 +138,7 @@ class AxisAdaptation:
     def _decided(self, state: AxisState) -> AxisState:
         known = np.append(state.unknowns[:HYSTERESIS], 0.0) + state.baseline
         kept = np.append(known[:HYSTERESIS], 0.0)
-        found = estimate(state.information, kept, AT_LIMIT * self._by_error)
+        found = estimate(state.information, kept, LIMIT.expected * self._by_error)
         dead_zone = self._dead_zone(state, found)
         change = found.unknowns - known
         if self._repeats and state.lines == self._first:
@@ -147,7 +147,7 @@ class AxisAdaptation:
             change = np.where(within, 0.0, change)
         linear = np.append(found.unknowns[:HYSTERESIS], 0.0)
         held = np.zeros(UNKNOWNS, dtype=np.bool_)
-        held[:] = state.information.left(linear) > AT_LIMIT
+        held[:] = state.information.left(linear) > LIMIT.expected
         held[GAIN] |= abs(change[HYSTERESIS]) > dead_zone[HYSTERESIS]
         return self._decided_creep(_each_judged(state, found.excited, held, change, dead_zone))
 
@@ -155,18 +155,18 @@ class AxisAdaptation:
         """Largest change (4,) of each unknown that is none."""
         deviation = np.hypot(found.model_error, found.noise)
         if not self._repeats or state.lines == self._first:
-            return np.asarray(AT_LIMIT * self._by_error * deviation)
+            return np.asarray(LIMIT.expected * self._by_error * deviation)
         changed = np.append(state.unknowns[:HYSTERESIS] != 0.0, False)
         return np.where(changed, self._by_noise * found.noise, self._by_error * deviation)
 
     def _decided_creep(self, state: AxisState) -> AxisState:
         """Change c where the means of the lines show it."""
         found = self._creep.estimate(state.creep)
-        dead_zone = AT_LIMIT * self._by_error * found.model_error
+        dead_zone = LIMIT.expected * self._by_error * found.model_error
         change = found.change - state.unknowns[CREEP]
         if dead_zone > room()[CREEP]:
             return _found(state, CREEP_NAME, Outcome.NOT_EXCITED, dead_zone)
-        if abs(change) > dead_zone and found.left > AT_LIMIT * self._creep.limit:
+        if abs(change) > dead_zone and found.left > LIMIT.expected * self._creep.limit:
             return _found(state, CREEP_NAME, Outcome.OTHER_CAUSE, dead_zone)
         return _judged(state, CREEP_NAME, CREEP, change, dead_zone)
 

@@ -29,8 +29,7 @@ import scipy
 from attrs import evolve, frozen
 
 from afm_scan_ros.core.diagnosis.axis_diagnosis import FOUND
-from afm_scan_ros.core.diagnosis.settings import SEARCH
-from afm_scan_ros.core.diagnosis.variance import KNOWN_FREEDOM
+from afm_scan_ros.core.diagnosis.settings import SEARCH, VARIANCE
 from afm_scan_ros.core.model import CONFIDENT
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.survey.recording import QuantityEstimate, Recording
@@ -148,7 +147,7 @@ def _by_limit(series: EstimateSeries, weight: Array, scale: Array) -> _Test:
     before, after = sums[:, :-1], sums[:, -1:] - sums[:, :-1]
     step = after[1] / after[0] - before[1] / before[0]
     variance = sum((scale + each[2]) / each[0] for each in (before, after))
-    return _Test(step, np.sqrt(variance), KNOWN_FREEDOM)
+    return _Test(step, np.sqrt(variance), VARIANCE.known)
 
 
 @frozen

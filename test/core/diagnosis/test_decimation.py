@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.diagnosis import evidence
 from afm_scan_ros.core.diagnosis.candidates import CANDIDATES, CandidateFitter
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, DetectionLimit
+from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Playback
-from afm_scan_ros.core.diagnosis.settings import DECIMATION, DecimationSettings
+from afm_scan_ros.core.diagnosis.settings import DECIMATION, LIMIT, DecimationSettings
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.record import Record
@@ -61,7 +61,7 @@ def test_a_decimated_record_is_predicted_as_the_record_is(healthy: Scan) -> None
     np.testing.assert_array_less(
         rms_by_band(moved, seen.limit.edges, period), 2.0 * DECIMATION.equal_within * seen.limit.rms
     )
-    assert seen.ratio(chain).max() < AT_LIMIT
+    assert seen.ratio(chain).max() < LIMIT.expected
 
 
 def test_a_short_record_is_not_decimated(healthy: Scan, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,10 +22,11 @@ from afm_scan_ros.core.diagnosis.discrepancy import (
 )
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.fit import Fit
-from afm_scan_ros.core.diagnosis.likelihood import FORMULA_ERRORS, CellFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import AxisSignals, Playback
 from afm_scan_ros.core.diagnosis.search import Posterior, Selection
+from afm_scan_ros.core.diagnosis.settings import LIKELIHOOD
 from afm_scan_ros.core.diagnosis.variance import CellVariance, log_density
 from afm_scan_ros.core.effects.registry import CATALOGUE, effect_type
 from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
@@ -61,7 +62,7 @@ def test_the_prior_odds_are_half_an_effect_a_scanner() -> None:
 
 
 def test_a_formula_is_exact_or_wrong_by_a_tenth() -> None:
-    assert FORMULA_ERRORS == (0.0, 0.1)
+    assert LIKELIHOOD.formula_error == 0.1
 
 
 def limit(rms: float, noise: float) -> DetectionLimit:

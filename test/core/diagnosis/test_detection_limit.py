@@ -9,8 +9,9 @@ from scipy.signal import sawtooth
 
 from afm_scan_ros.core.bands import rms_by_band
 from afm_scan_ros.core.closed_loop import FIRST
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT, detection_limit
+from afm_scan_ros.core.diagnosis.discrepancy import detection_limit
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.settings import LIMIT
 from afm_scan_ros.core.model import ModelDiscrepancy, band_edges
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -28,12 +29,12 @@ FAST = evolve(SMOOTH, line_rate=100.0, lines=100, range_x=28e-6, range_y=28e-6)
 @pytest.mark.parametrize("pattern", ["raster", "spiral"])
 @pytest.mark.parametrize("lines", [6, 100])
 def test_a_healthy_scanner_scans_at_its_floor_however_long(pattern: str, lines: int) -> None:
-    assert _over_limit(evolve(SCAN, pattern=pattern, lines=lines)) < AT_LIMIT
+    assert _over_limit(evolve(SCAN, pattern=pattern, lines=lines)) < LIMIT.expected
 
 
 @pytest.mark.parametrize("spec", [CROSSING, FAST])
 def test_a_healthy_scanner_is_at_its_floor_where_it_resonates(spec: ScanSpec) -> None:
-    assert _over_limit(spec) < AT_LIMIT
+    assert _over_limit(spec) < LIMIT.expected
 
 
 def _over_limit(spec: ScanSpec) -> float:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.fit import Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.settings import LIMIT
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import dither_plan
 from afm_scan_ros.core.record import Record
@@ -48,4 +48,4 @@ def test_a_delay_and_a_lag_of_less_than_a_sample_are_told_apart(true: str, other
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_a_healthy_scanner_leaves_its_floor(axis: str) -> None:
     seen = evidence_of(axis, default_model(), dithered())
-    assert seen.ratio(chain_of(default_model().axis(axis))).max() < AT_LIMIT
+    assert seen.ratio(chain_of(default_model().axis(axis))).max() < LIMIT.expected

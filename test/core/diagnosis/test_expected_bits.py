@@ -18,7 +18,7 @@ from afm_scan_ros.core.diagnosis.experiments import (
     information,
     propose,
 )
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM
+from afm_scan_ros.core.diagnosis.settings import VARIANCE
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.identification.drives.experiments import EXPERIMENTS
 from afm_scan_ros.core.record import Record
@@ -58,10 +58,10 @@ def products_of(signals: Array) -> Array:
     return cells.products(found, found)
 
 
-def told(signals: Array, *counts: int, known: float = KNOWN_FREEDOM) -> tuple[float, float]:
+def told(signals: Array, *counts: int, known: float = VARIANCE.known) -> tuple[float, float]:
     products = products_of(signals)
     variances, equal = np.ones((len(counts), BANDS)), np.zeros(len(counts))
-    each = np.full(BANDS, known), np.full(BANDS, FREEDOM)
+    each = np.full(BANDS, known), np.full(BANDS, VARIANCE.freedom)
     return information(products, counts, variances, *each, equal)
 
 
@@ -87,7 +87,7 @@ def test_bits_never_fall_with_the_amplitude(seed: int, sizes: tuple[float, float
 def test_what_a_parameter_absorbs_is_no_information(seed: int, sure: float) -> None:
     """The distance falls as the parameter is known less; in the end nothing is left of it."""
     moved = np.random.default_rng(seed).standard_normal(SAMPLES)
-    each = np.outer((1.0, KNOWN_FREEDOM, FREEDOM), np.ones(BANDS))
+    each = np.outer((1.0, VARIANCE.known, VARIANCE.freedom), np.ones(BANDS))
 
     def apart(deviation: float) -> float:
         signals = np.array([moved, deviation * moved, deviation * moved])

@@ -17,7 +17,8 @@ from afm_scan_ros.core.diagnosis.fit import BaseRidge
 from afm_scan_ros.core.diagnosis.free_directions import with_free_directions
 from afm_scan_ros.core.diagnosis.likelihood import Likelihood, LinearResidual, Outside
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, log_density, weights
+from afm_scan_ros.core.diagnosis.settings import VARIANCE
+from afm_scan_ros.core.diagnosis.variance import log_density, weights
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_resonance
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.model import AxisModel
@@ -30,7 +31,7 @@ from helpers.spreads import known
 
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-BANDS, KNOWN, FEW = 12, np.full(12, 8.0), np.full(12, FREEDOM)
+BANDS, KNOWN, FEW = 12, np.full(12, 8.0), np.full(12, VARIANCE.freedom)
 SEEDS = st.integers(0, 2**32 - 1)
 SIZED = st.floats(0.1, 30.0)
 SETTLED = 20_000

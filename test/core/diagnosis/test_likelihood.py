@@ -13,7 +13,8 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
 from afm_scan_ros.core.diagnosis.records import Playback
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, log_density
+from afm_scan_ros.core.diagnosis.settings import VARIANCE
+from afm_scan_ros.core.diagnosis.variance import log_density
 from afm_scan_ros.core.effects.registry import effect_type
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -23,13 +24,13 @@ from helpers.in_process import ALL, default_model, scan
 SIZES = st.floats(1e-4, 1e4)
 SPEC = ScanSpec(line_rate=20.0, lines=6, samples_per_line=500)
 CHAIN = chain_of(default_model().x)
-KNOWN, FEW = np.array(KNOWN_FREEDOM), np.array(FREEDOM)
+KNOWN, FEW = np.array(VARIANCE.known), np.array(VARIANCE.freedom)
 
 
-def bands(*ratios: float, known: float = KNOWN_FREEDOM) -> CellFit:
+def bands(*ratios: float, known: float = VARIANCE.known) -> CellFit:
     """Bands of so many times the healthy residual's mean square."""
     count = len(ratios)
-    return CellFit(np.array(ratios), *np.outer((1.0, known, FREEDOM), np.ones(count)), 0.0)
+    return CellFit(np.array(ratios), *np.outer((1.0, known, VARIANCE.freedom), np.ones(count)), 0.0)
 
 
 def test_the_density_is_student_s() -> None:

@@ -18,7 +18,8 @@ from afm_scan_ros.core.diagnosis.candidates import (
 from afm_scan_ros.core.diagnosis.fit import Fit
 from afm_scan_ros.core.diagnosis.likelihood import CellFit
 from afm_scan_ros.core.diagnosis.search import ModelSearch, Selection
-from afm_scan_ros.core.diagnosis.variance import FREEDOM, KNOWN_FREEDOM, log_density
+from afm_scan_ros.core.diagnosis.settings import VARIANCE
+from afm_scan_ros.core.diagnosis.variance import log_density
 from afm_scan_ros.core.effects.effect_type import EffectForm
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.types import Array, Tally
@@ -33,7 +34,7 @@ Left = Mapping[tuple[str, ...], float]
 def fit(names: Iterable[str], left: Left) -> CellFit:
     present = set(names)
     rms = min(value for needed, value in left.items() if present.issuperset(needed))
-    cells = np.outer((rms**2, 1.0, KNOWN_FREEDOM, FREEDOM), np.ones(BANDS))
+    cells = np.outer((rms**2, 1.0, VARIANCE.known, VARIANCE.freedom), np.ones(BANDS))
     return CellFit(*cells, float(np.sum(log_density(*cells))))
 
 

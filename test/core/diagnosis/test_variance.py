@@ -9,14 +9,8 @@ from scipy.stats import f
 from afm_scan_ros.core.diagnosis.cells import RecordCells
 from afm_scan_ros.core.diagnosis.discrepancy import DetectionLimit
 from afm_scan_ros.core.diagnosis.repetition import Repetition
-from afm_scan_ros.core.diagnosis.settings import PARTING
-from afm_scan_ros.core.diagnosis.variance import (
-    FREEDOM,
-    KNOWN_FREEDOM,
-    TYPICAL_SHARE,
-    CellVariance,
-    satterthwaite,
-)
+from afm_scan_ros.core.diagnosis.settings import PARTING, VARIANCE
+from afm_scan_ros.core.diagnosis.variance import CellVariance, satterthwaite
 from afm_scan_ros.core.types import Array
 
 COUNT, PERIOD, PERIODS = 16_000, 1e-3, 40.0
@@ -31,7 +25,7 @@ SIZES = st.floats(1e-3, 1e3)
 
 
 def found(residual: Array) -> CellVariance:
-    return CellVariance.repeating(LIMIT, CELLS, MOVED, residual, KNOWN_FREEDOM)
+    return CellVariance.repeating(LIMIT, CELLS, MOVED, residual, VARIANCE.known)
 
 
 @given(one=SIZES, other=SIZES, few=SIZES, many=SIZES)
@@ -46,7 +40,7 @@ def test_noise_between_the_harmonics_has_as_many_amplitudes_as_coefficients() ->
     """Those with the motion are few: what the model gets wrong there has no more."""
     variance = found(np.random.default_rng(1).standard_normal(COUNT))
     along, between = variance.freedom.reshape(2, CELLS.bands)
-    np.testing.assert_array_equal(along, FREEDOM)
+    np.testing.assert_array_equal(along, VARIANCE.freedom)
     np.testing.assert_array_less(100.0, between[2:])
     np.testing.assert_allclose(
         variance.total[CELLS.bands + 2 :], (CELLS.counts / COUNT)[CELLS.bands + 2 :], rtol=0.2
@@ -88,10 +82,10 @@ def test_the_record_tells_its_own_noise(factor: float) -> None:
 def test_at_rest_all_is_noise_but_what_moves() -> None:
     cells = RecordCells(EDGES, COUNT, PERIOD)
     still = DetectionLimit(EDGES, NOISE, NOISE, 50.0)
-    variance = CellVariance.at_rest(still, cells, np.zeros(COUNT), KNOWN_FREEDOM)
+    variance = CellVariance.at_rest(still, cells, np.zeros(COUNT), VARIANCE.known)
     np.testing.assert_allclose(variance.freedom, cells.counts)
-    drifting = CellVariance.at_rest(still, cells, np.linspace(0.0, 3.0, COUNT), KNOWN_FREEDOM)
-    assert drifting.freedom[0] < 2.0 * FREEDOM
+    drifting = CellVariance.at_rest(still, cells, np.linspace(0.0, 3.0, COUNT), VARIANCE.known)
+    assert drifting.freedom[0] < 2.0 * VARIANCE.freedom
 
 
 def test_what_exceeds_the_error_of_healthy_records_is_none_of_the_model() -> None:
@@ -99,7 +93,11 @@ def test_what_exceeds_the_error_of_healthy_records_is_none_of_the_model() -> Non
     wander = np.sin(2.0 * np.pi * 7.5 * np.arange(COUNT) / COUNT)
     variance = found(MOVED * wander + np.random.default_rng(3).standard_normal(COUNT))
     _, between = variance.total.reshape(2, CELLS.bands)
-    most = TYPICAL_SHARE * 2.0**2 * f.isf(PARTING.false_alarm, FREEDOM, KNOWN_FREEDOM)
+    most = (
+        VARIANCE.typical_share
+        * 2.0**2
+        * f.isf(PARTING.false_alarm, VARIANCE.freedom, VARIANCE.known)
+    )
     assert between[0] <= most + PARTING.other_noise**2 * NOISE[0] ** 2
     power = CELLS.power(CELLS.coefficients(MOVED * wander))[CELLS.bands]
     assert power > 100.0 * between[0]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.discrepancy import AT_LIMIT
 from afm_scan_ros.core.diagnosis.evidence import Evidence
 from afm_scan_ros.core.diagnosis.preparation import evidence_of
+from afm_scan_ros.core.diagnosis.settings import LIMIT
 from afm_scan_ros.core.effects.parameter_shift import insert_creep, insert_gain, insert_resonance
 from afm_scan_ros.core.record import Record
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -82,7 +82,7 @@ def test_noise_scatters_the_estimates_as_stated() -> None:
 
 def test_a_model_that_fits_leaves_less_than_its_limit_and_a_change_leaves_more() -> None:
     assert told({})["residual_ratio"].value < 1.0
-    assert told({"gain": 1.03})["residual_ratio"].value > AT_LIMIT
+    assert told({"gain": 1.03})["residual_ratio"].value > LIMIT.expected
 
 
 def test_what_a_recording_does_not_tell_is_left_out() -> None:

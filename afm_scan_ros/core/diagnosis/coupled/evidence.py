@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.stats import combine_pvalues
 
 from afm_scan_ros.core.coupled_scanner import CoupledScanner, LevelError
-from afm_scan_ros.core.diagnosis.likelihood import FALSE_LACK, CellFit
+from afm_scan_ros.core.diagnosis.likelihood import CellFit
+from afm_scan_ros.core.diagnosis.settings import LIKELIHOOD
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.state_space.feedback import FeedbackModel
 from afm_scan_ros.core.identification.state_space.identify import (
@@ -182,7 +183,7 @@ class HeldOutLikelihood:
         parts, count = cells > 0, self.amplitudes
         mean = ratio[:, :, ~self.healthy].sum(axis=(1, 2))[parts] / cells[parts]
         tails = scipy.stats.f.sf(mean, count * cells[parts], count)
-        return bands.adequate and bool(combine_pvalues(tails).pvalue >= FALSE_LACK)
+        return bands.adequate and bool(combine_pvalues(tails).pvalue >= LIKELIHOOD.false_lack)
 
     def outside(self) -> float:
         """Log evidence (nats) of something that no effect describes."""
