@@ -1,9 +1,10 @@
 """Spectral lines of a residual that neither the sensor's noise nor a transient explains.
 
-The periodogram of noise has an exponential distribution, and the largest of n independent values
-exceeds ln(n / p) times their mean with the probability p. The mean is that of the neighbourhood,
-by its median, since noise and what leaks of the model's error are smooth over a few lines. A tone
-lasts, so it has its share in both halves of the record; what decays after a move has not.
+The periodogram of noise has an exponential distribution. Its mean at a line is told by the median
+of m independent neighbours, since noise and what leaks of the model's error are smooth over a few
+lines: as well as by the mean of k = m ln² 2 of them. A value exceeds k ((n / p)^(1/k) - 1) times
+that mean with the probability p / n, and one of n values with p. A tone lasts, so it has its share
+in both halves of the record; what decays after a move has not.
 """
 
 import numpy as np
@@ -31,15 +32,13 @@ def lasting_lines(
     periods = frequencies * count * sample_period
     kept = of.clear(periods, settings.clear) if of else periods > settings.clear
     power = np.where(kept, np.abs(halves[0] + halves[1]) ** 2, 0.0)
-    mean = np.full(len(power), np.inf)
-    mean[kept] = _local_mean(power[kept], settings.neighbourhood)
-    least = np.minimum(*np.abs(halves)) ** 2
-    loud = (power > np.log(max(kept.sum(), 1) / settings.false_alarm) * mean) & (
-        least >= settings.lasting**2 * power
-    )
+    least = np.full(len(power), np.inf)
+    least[kept] = _beyond_chance(power[kept], settings)
+    lasts = np.minimum(*np.abs(halves)) ** 2 >= settings.lasting**2 * power
+    loud = (power > least) & lasts
     peaks = loud[1:-1] & (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
     found = 1 + np.flatnonzero(peaks)
-    return tuple(frequencies[found[np.argsort(-power[found] / mean[found])]].tolist())
+    return tuple(frequencies[found[np.argsort(-power[found] / least[found])]].tolist())
 
 
 def without_tones(
@@ -58,12 +57,21 @@ def without_tones(
     return left
 
 
-def _local_mean(power: Array, neighbourhood: int) -> Array:
-    """Mean (n,) of the neighbours of exponential values (n,), by their median; none at the ends."""
-    mean = scipy.ndimage.median_filter(power, neighbourhood, mode="nearest") / np.log(2.0)
-    half = neighbourhood // 2
-    mean[:half], mean[len(mean) - half :] = np.inf, np.inf
-    return np.asarray(mean)
+def _beyond_chance(power: Array, settings: PartingSettings) -> Array:
+    """Least power (n,) of a line that chance hardly makes, of a periodogram (n,).
+
+    Of a record padded to twice its length, three values tell a median as well as two independent
+    ones. Towards the ends the neighbourhood becomes smaller.
+    """
+    count, half = len(power), settings.neighbourhood // 2
+    reach = np.minimum(half, np.minimum(np.arange(count), np.arange(count)[::-1]))
+    median = scipy.ndimage.median_filter(power, settings.neighbourhood, mode="nearest")
+    for i in np.flatnonzero(reach < half):
+        median[i] = np.median(power[i - reach[i] : i + reach[i] + 1])
+    known = 2.0 / 3.0 * (2 * reach + 1) * np.log(2.0) ** 2
+    with np.errstate(over="ignore"):
+        ratio = known * np.expm1(np.log(max(count, 1) / settings.false_alarm) / known)
+    return np.asarray(ratio * median / np.log(2.0))
 
 
 def _tone(residual: Array, sample_period: float, frequency: float) -> Array:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from afm_scan_ros.core.diagnosis.repetition import Repetition
 from afm_scan_ros.core.diagnosis.settings import PARTING
@@ -25,7 +26,7 @@ def tone(frequency: float, size: float) -> Array:
 
 def test_noise_alone_shows_a_line_as_rarely_as_stated() -> None:
     alarms = sum(bool(lasting_lines(noise(k), PERIOD, None)) for k in range(DRAWS))
-    assert alarms <= 10.0 * PARTING.false_alarm * DRAWS
+    assert alarms <= binom.isf(1e-3, DRAWS, PARTING.false_alarm)
 
 
 def test_a_tone_half_as_large_again_as_the_least_is_found() -> None:
@@ -36,6 +37,14 @@ def test_a_tone_half_as_large_again_as_the_least_is_found() -> None:
         lines = lasting_lines(noise(k) + tone(frequency, 1.5 * DETECTED), PERIOD, None)
         found += bool(lines) and abs(lines[0] - frequency) <= 1.0 / (COUNT * PERIOD)
     assert found >= 45
+
+
+@pytest.mark.parametrize("turns", [6.5, 10.5])
+def test_a_line_between_the_first_harmonics_is_found(turns: float) -> None:
+    of = Repetition(0, COUNT, 6.0)
+    frequency = turns * 6.0 / (COUNT * PERIOD)
+    (line, *_) = lasting_lines(noise(4) + tone(frequency, 1.0), PERIOD, of)
+    assert abs(line - frequency) <= 1.0 / (COUNT * PERIOD)
 
 
 def test_a_transient_is_no_line() -> None:
