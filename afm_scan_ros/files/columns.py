@@ -240,7 +240,7 @@ def read_table_record(
     values = _values(sources, chosen)
     if (sample_rate is None) == (TIME not in values):
         raise InputError(
-            f"{paths[0]}: give either a sample rate or a column 'time', for when samples were taken"
+            f"{paths[0]}: give either a sample rate or a column 'time', in seconds since any moment"
         )
     signals = _paired(paths[0], values, use)
     if sample_rate:

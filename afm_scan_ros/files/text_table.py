@@ -27,7 +27,10 @@ NUMBER = re.compile(
 COMMENTS = ("#", "%")
 SEPARATORS = (";", "\t", ",", None)
 """In the order in which they are preferred; None stands for blanks."""
-FIX = "correct the cell, or leave its row out with 'afm-scan import-csv --start-row --stop-row'"
+FIX = (
+    "correct the cell, or import the rows before and after it separately, with 'afm-scan import-csv"
+    " --start-row --stop-row'"
+)
 CUT = "the file was cut short: remove the line"
 
 
@@ -226,10 +229,12 @@ def _first_row(table: TextTable, width: int, numeric: Sequence[int]) -> int:
         if numeric and all(good):
             return k
         if row.strip() and not whole and all(map(table.dialect.is_number, cells)):
+            fix = f"give --skip-rows {table.lines[k]} where it is part of a heading"
+            if '"' in row:
+                fix = "write numbers without marks for thousands"
             raise InputError(
                 f"{table.path}: line {table.lines[k]} has {len(cells)} columns, those below have"
-                f" {width}: correct the line, or give --skip-rows {table.lines[k]} where it is part"
-                " of a heading"
+                f" {width}: correct the line, or {fix}"
             )
         if any(good):
             raise InputError(

@@ -109,6 +109,11 @@ IN_TEXT = {
         "0;1,234.5\n1;2,500.5\n2;3,500.5\n3;4,500.5\n",
         "line 1, column 2: '1,234.5' is not a number: correct the cell",
     ),
+    "marks for thousands within quotation marks": (
+        '0,"12.5"\n1,"1,200.5"\n2,"1,201.5"\n3,"1,202.5"\n',
+        "line 1 has 2 columns, those below have 3: correct the line, or write numbers without marks"
+        " for thousands",
+    ),
     "two decimal marks": (
         "0;1,5\n1;2.5\n2;3,5\n3;4,5\n",
         "line 1, column 2: '1,5' has a comma where other rows have a point",

@@ -108,7 +108,8 @@ def _in_step(axis: str, samples: int, period: float) -> Iterator[str]:
     if not -(EARLY + 2.0 * period) < late < LATE + 2.0 * period:
         yield (
             f"displacement {axis} {'lags' if late > 0.0 else 'leads'} its drive by"
-            f" {abs(late):.3g} s: the two are not synchronised; start both on one clock"
+            f" {abs(late):.3g} s: the two are not synchronised; start both on one clock,"
+            f" or correct the unit of time, if samples do not take {period:.3g} s"
         )
 
 

@@ -54,7 +54,7 @@ def course_problems(axis: str, drive: Array, displacement: Array) -> Iterator[st
         yield (
             f"displacement {axis} {_what(displacement, sample)} at sample {sample}: it is"
             f" {1e9 * abs(error[first]):.3g} nm off its course, some {1e9 * usual[first]:.2g} nm"
-            " are usual; record it again, without a gap"
+            " are usual; record it again, or give what is before and after as two records"
         )
 
 
@@ -220,7 +220,7 @@ def _clipped(axis: str, displacement: Array, moving: NDArray[np.bool_]) -> Itera
             yield (
                 f"displacement {axis} is clipped at its {end} end, {values[rail]:.4g} m, in"
                 f" {counts[rail]} samples from sample {first} on; record it with less drive or a"
-                " wider sensor range"
+                " wider sensor range, or leave out the samples if the value marks missing ones"
             )
 
 
