@@ -22,6 +22,7 @@ from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.optimal_inverse import RelativeWeight, SmoothWeight
 from afm_scan_ros.core.effects.sensor import led
+from afm_scan_ros.core.effects.vibration import LARGEST_TAIL
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.intersample import HELD, upsampling, voltages_of
 from afm_scan_ros.core.limits import DriveLimits
@@ -261,7 +262,8 @@ class Model:
         Parameters
         ----------
         desired
-            m, shape (n,) or (n, channels), from depolarised rest at zero on.
+            m, shape (n,) or (n, channels), from depolarised rest at zero on. A warning in the log
+            names an axis that begins elsewhere, which its first samples cannot follow.
         sample_period
             s.
         effects
@@ -309,6 +311,7 @@ class Model:
         self._refuse_periodic(periodic=periodic)
         self._warn_of_unknown_effects()
         target = self._trace("desired", desired, sample_period)
+        self._warn_of_start(target)
         names = "a list of effects, as ['creep']"
         chosen = INVERSES if effects is None else all_of_type(str, "effects", effects, names)
         settings = InverseSettings()
@@ -355,6 +358,18 @@ class Model:
     def _warn_of_unknown_effects(self) -> None:
         for sentence in unknown_effects(self.effects):
             LOG.warning("%s", sentence)
+
+    def _warn_of_start(self, target: Trace) -> None:
+        """Say which axes do not begin at zero, but for what a preview may cut off too."""
+        for name in self.axes:
+            path = target.axis(name)
+            if abs(path[0]) > LARGEST_TAIL * np.max(np.abs(path)):
+                LOG.warning(
+                    "desired %s begins at %.4g m and the scanner at zero: its first samples are not"
+                    " followed, and the drive steps; begin it at zero",
+                    name,
+                    path[0],
+                )
 
     def _trace(self, what: str, given: ArrayLike, sample_period: float) -> Trace:
         values = samples(what, given)

@@ -139,7 +139,10 @@ def bag_files(path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         raise InputError(f"{path} does not exist: give a rosbag2 folder or an .mcap file")
     for file in files:
         if not is_mcap(file):
-            raise InputError(f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap'")
+            raise InputError(
+                f"{file} is not an MCAP file: record with 'ros2 bag record -s mcap', or import a"
+                " table by 'afm-scan import-csv'"
+            )
         _refuse_sizes(file)
     return files, warnings + tuple(_cut(path, f) for f in files if not is_whole(f))
 

@@ -11,7 +11,7 @@ from afm_scan_ros.report.table import Row, Table
 SURVEY = "survey"
 COLUMNS = {
     "record": ("record", ""),
-    "minutes": ("minutes", ".1f"),
+    "minutes": ("minutes", ".3g"),
     "samples_per_s": ("samples a second", ".6g"),
     "identifies": ("identifies", ""),
 }
@@ -21,7 +21,7 @@ def plan_table(proposed: Sequence[ProposedRecord]) -> Table:
     """One row a record."""
     total = sum(record.seconds for record in proposed) / 60.0
     rows = [_row(record) for record in proposed]
-    return Table("plan", f"Records to take, {total:.1f} minutes together", COLUMNS, rows)
+    return Table("plan", f"Records to take, {total:.3g} minutes together", COLUMNS, rows)
 
 
 def _row(record: ProposedRecord) -> Row:

@@ -111,8 +111,7 @@ IN_TEXT = {
     ),
     "marks for thousands within quotation marks": (
         '0,"12.5"\n1,"1,200.5"\n2,"1,201.5"\n3,"1,202.5"\n',
-        "line 1 has 2 columns, those below have 3: correct the line, or write numbers without marks"
-        " for thousands",
+        "columns, those below have 3: correct the line, or write numbers without marks for",
     ),
     "two decimal marks": (
         "0;1,5\n1;2.5\n2;3,5\n3;4,5\n",

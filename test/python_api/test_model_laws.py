@@ -157,3 +157,15 @@ def test_a_scan_that_moves_an_absent_axis_is_refused() -> None:
     still, moving = np.zeros(10), np.eye(10)[7]
     with pytest.raises(afm.ScanError, match="sample 107, axis y: the model holds no axis y"):
         inverse.invert(inverse.at_rest(), Trace(100, PERIOD, still, moving))
+
+
+@pytest.mark.parametrize("first", [0.0, 5e-6])
+def test_a_path_that_does_not_begin_at_rest_is_said_not_to(
+    first: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    desired = np.zeros((2000, 2))
+    desired[:, 0] = first + 1e-6 * np.sin(np.linspace(0.0, 20.0, 2000)) ** 2
+    afm.load_model().invert(desired, 1e-4)
+    said = "desired x begins at 5e-06 m and the scanner at zero"
+    assert (said in caplog.text) is (first > 0.0)
+    assert "desired y" not in caplog.text
