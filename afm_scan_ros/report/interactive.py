@@ -130,7 +130,7 @@ class _Drawing:
             y_axis_label=panel.y,
             x_axis_type="datetime" if panel.dates else _scale(panel, "x"),
             y_axis_type=_scale(panel, "y"),
-            height=round(DRAWING.row * self.picture.height),
+            **self._size(panel),
             sizing_mode="stretch_width",
             tools=TOOLS,
             active_drag="auto_box_zoom",
@@ -148,6 +148,16 @@ class _Drawing:
             self._pick_line(plot, panel.maps[0], count)
         self._tell(plot, panel)
         return plot
+
+    def _size(self, panel: Panel) -> dict[str, Any]:
+        """Height of a panel, or the aspect of an image in one unit of length."""
+        for of in panel.maps:
+            left, right, bottom, top = of.span
+            if panel.x[1:] == panel.y[1:]:
+                shape = (right - left) / (top - bottom)
+                shape = min(max(shape, 1.0 / DRAWING.longest), DRAWING.longest)
+                return {"aspect_ratio": DRAWING.image * shape}
+        return {"height": round(DRAWING.row * self.picture.height)}
 
     def _add(self, mark: Mark, plot: Plot) -> None:
         source = self._image(mark) if isinstance(mark, Map) else _source_of(mark)
