@@ -133,7 +133,7 @@ def _may_be_exchanged(gain: float, beside: float, scale: float, most: float) -> 
 
 
 def _refuse_backward(shown: Sequence[_RecordGain], scale: float, most: float) -> None:
-    """Refuse a record whose loops go the other way, with 95 % confidence, about as wide.
+    """Refuse a record whose loops go the other way about as wide, with 95 % confidence.
 
     Its gain is the inverse of the others', or else its columns are not exchanged.
     """
@@ -143,7 +143,7 @@ def _refuse_backward(shown: Sequence[_RecordGain], scale: float, most: float) ->
         least = min((each.loops - each.half for each in others), default=0.0)
         beside = float(np.median([each.gain for each in others])) if others else 0.0
         inverse = _may_be_exchanged(one.gain, beside, scale, most)
-        if inverse and one.loops + one.half < 0.0 < least and -one.loops > least / most:
+        if inverse and least > 0.0 and one.loops + one.half < -least / most:
             raise InputError(
                 f"{one.name}: its displacement runs ahead of its drive, as wide as those of the"
                 " other records lag: its two columns are exchanged; name them the other way round"

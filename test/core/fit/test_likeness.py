@@ -6,7 +6,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.fit.axis import started
-from afm_scan_ros.core.fit.likeness import refuse_unlike
+from afm_scan_ros.core.fit.likeness import _RecordGain, _refuse_backward, refuse_unlike
 from afm_scan_ros.core.fit.settings import DEFAULT_SETTINGS
 from afm_scan_ros.core.record import Record
 
@@ -66,3 +66,15 @@ def test_the_gain_of_one_scanner_may_grow_with_its_swing_and_not_fall() -> None:
     check([shrunk, *given[1:]])
     with pytest.raises(InputError, match=r"^95 V: it moves"):
         check([*given[:2], evolve(given[2], displacement=given[2].displacement / 3.0)])
+
+
+@pytest.mark.parametrize(("loops", "refused"), [(-189.0, False), (-300.0, True), (-124.0, False)])
+def test_loops_that_may_be_those_of_noise_are_not_backward(loops: float, *, refused: bool) -> None:
+    """A multisine of 0.8 V that begins at once, beside moves of 10 V that lag by 246 at least."""
+    moves = _RecordGain("moves", 1.17, 20.0, 1132.0, 886.0)
+    waves = _RecordGain("waves", 0.954, 1.6, loops, 165.0)
+    if not refused:
+        _refuse_backward([waves, moves], 8.06e-7, DEFAULT_SETTINGS.like_gains)
+        return
+    with pytest.raises(InputError, match=r"^waves: .* are exchanged"):
+        _refuse_backward([waves, moves], 8.06e-7, DEFAULT_SETTINGS.like_gains)
