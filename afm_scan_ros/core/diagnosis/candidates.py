@@ -227,7 +227,7 @@ class CandidateFitter:
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
         forms = self._forms(candidates)
         evidence: Sequence[Evidence] = self.evidence
-        disturbed = any(p.located for form in forms for p in form.parameters)
+        disturbed = any(p.own for form in forms for p in form.parameters)
         seen = Evidence.whitened if disturbed else Evidence.whitened_along
         trial = None
         for _ in range(SEARCH.reweightings):

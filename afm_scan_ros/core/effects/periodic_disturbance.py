@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from afm_scan_ros.core.chain import Chain
@@ -105,15 +105,6 @@ def insert(chain: Chain, values: Array) -> Chain:
 def insert_driven(chain: Chain, values: Array) -> Chain:
     """Disturb the drive: amplitudes in V."""
     return chain.with_drive(Element(Disturbance, _waves(values)))
-
-
-def undisturbed(chain: Chain) -> Chain:
-    """Return the chain of one record without disturbances; the same one where it has none."""
-    drive, output = (
-        tuple(each for each in elements if getattr(each, "make", None) is not Disturbance)
-        for elements in (chain.drive, chain.output)
-    )
-    return evolve(chain, drive=drive, output=output)
 
 
 def _waves(values: Array) -> tuple[tuple[complex, ...], float]:
