@@ -8,7 +8,7 @@ import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.chain import Chain
-from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated
+from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated, repeating
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.diagnosis.settings import SEARCH
@@ -227,7 +227,8 @@ class CandidateFitter:
     def _fitted(self, candidates: tuple[Candidate, ...], rows: Array) -> FittedCandidates | None:
         forms = self._forms(candidates)
         evidence: Sequence[Evidence] = self.evidence
-        disturbed = any(p.own for form in forms for p in form.parameters)
+        begun = inserted(self.chain, forms, rows).of_record(0)
+        disturbed = repeating(begun) != begun
         seen = Evidence.whitened if disturbed else Evidence.whitened_along
         trial = None
         for _ in range(SEARCH.reweightings):

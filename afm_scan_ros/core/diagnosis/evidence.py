@@ -24,8 +24,10 @@ from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.diagnosis.settings import DECIMATION, EVIDENCE, LIMIT, VARIANCE
 from afm_scan_ros.core.diagnosis.tones import lasting_lines
 from afm_scan_ros.core.diagnosis.variance import CellVariance
+from afm_scan_ros.core.effects.creep import Creep
 from afm_scan_ros.core.effects.drift import Drift
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance
+from afm_scan_ros.core.effects.slow_creep import NortonCreep
 from afm_scan_ros.core.types import Array
 
 
@@ -38,9 +40,9 @@ class Evidence:
     the base model adds. ``cells`` are those of the model's motion, and ``variance`` is that of a
     residual in them. ``weights`` (cells,) in 1/m² are those of least squares, by default for a
     residual as expected. ``between`` (l,) are the coefficients between the harmonics of what the
-    model leaves without disturbances and drift. Only these change them: what the motion changes
-    there is the model's error before it is an effect. ``fitted`` (n,) are the samples of every
-    other stretch.
+    model leaves without what never repeats. Only that changes them: what the motion changes there
+    is the model's error before it is an effect. ``fitted`` (n,) are the samples of every other
+    stretch.
     """
 
     playback: Playback
@@ -135,7 +137,7 @@ class Evidence:
         return weighted(self.residual(chain), weights)
 
     def coefficients(self, chain: Chain) -> Array:
-        """Coefficients (k,) of a chain's residual; between harmonics less what no drive causes."""
+        """Coefficients (k,) of a chain's residual; between harmonics less what never repeats."""
         disturbed = self._disturbance(chain)
         between = self.between
         if disturbed.any():
@@ -143,9 +145,9 @@ class Evidence:
         return self.cells.coefficients(self.residual(chain), between)
 
     def _disturbance(self, chain: Chain) -> Array:
-        """Displacement (n,) in m by what no drive causes in a chain, whatever it does besides."""
+        """Displacement (n,) in m by what never repeats in a chain, whatever it does besides."""
         chain = chain.of_record(self.playback.view.number)
-        without = undisturbed(chain)
+        without = repeating(chain)
         if without == chain:
             return np.zeros(len(self.playback.view.drive))
         return self.playback.displacement(chain) - self._without.displacement(without)
@@ -182,10 +184,14 @@ class Evidence:
         return rms_by_band(self.residual(chain), self.limit.edges, period) / self.limit.rms
 
 
-def undisturbed(chain: Chain) -> Chain:
-    """Return the chain of one record without what no drive causes; the same one if it has none."""
+UNREPEATED = Disturbance, Drift, Creep, NortonCreep
+"""Elements whose motion does not repeat with the drive's."""
+
+
+def repeating(chain: Chain) -> Chain:
+    """Return the chain of one record without elements of unrepeated motion, if it has any."""
     drive, output = (
-        tuple(each for each in elements if getattr(each, "make", None) not in (Disturbance, Drift))
+        tuple(each for each in elements if getattr(each, "make", None) not in UNREPEATED)
         for elements in (chain.drive, chain.output)
     )
     return evolve(chain, drive=drive, output=output)
