@@ -10,6 +10,7 @@ All factors are 1 where nothing has changed:
 - creep: all gains times one factor and all time constants times another.
 - hysteresis: F = R(u) + k H(u), with R the reversible part, or the centre curve of a Duhem
   operator, and H the rest.
+- polarisation: k F of such an F, gain and memory at once, as a piezo ages or is poled anew.
 - warmth: gain and creep at once. A warmer piezo moves further and creeps sooner; heat changes the
   rate of creep far more than its amount.
 
@@ -45,6 +46,7 @@ RESONANCE = _factor("frequency_factor", 0.7, 1.4), _factor("damping_factor", 0.1
 STIFFNESS = (_factor("stiffness_factor", 0.5, 2.0),)
 CREEP = _factor("gain_factor", 0.0, 10.0), _factor("time_factor", 0.2, 5.0)
 MEMORY = (_factor("memory_factor", 0.0, 3.0),)
+POLARISATION = *GAIN, *MEMORY
 WARMTH = tuple(
     _factor(name, 1.0 / most, most)
     for name, most in (("factor", 1.25), ("gain_factor", 2.0), ("time_factor", 10.0))
@@ -101,6 +103,11 @@ def insert_hysteresis(chain: Chain, values: Array) -> Chain:
     return chain.with_model(hysteresis=evolve(base, forward=forward, direct=direct))
 
 
+def insert_polarisation(chain: Chain, values: Array) -> Chain:
+    """Multiply G by a factor, and what has memory by another."""
+    return insert_hysteresis(insert_gain(chain, values[:1]), values[1:])
+
+
 @register
 def parameter_shift() -> EffectType:
     """Describe the effect."""
@@ -108,7 +115,7 @@ def parameter_shift() -> EffectType:
         name="parameter_shift",
         equation="factor G, or frequency_factor and damping_factor of G's first resonance, or"
         " stiffness_factor of it, or gain_factor and time_factor of creep, or these and factor G,"
-        " or F = R(u) + memory_factor H(u)",
+        " or F = R(u) + memory_factor H(u), or this and factor G",
         needs="the drive of its identification: steps for creep, loops for hysteresis, a broad"
         " band for the resonance. For a gain: motion over a known length",
         experiment="broadband",
@@ -141,6 +148,13 @@ def parameter_shift() -> EffectType:
                 example=(1.03, 1.5, 0.5),
             ),
             EffectForm("hysteresis", ("hysteresis",), MEMORY, insert_hysteresis, example=(0.8,)),
+            EffectForm(
+                "polarisation",
+                ("vibration", "hysteresis"),
+                POLARISATION,
+                insert_polarisation,
+                example=(0.95, 1.2),
+            ),
         ),
         feedback=LINEAR,
     )

@@ -25,7 +25,7 @@ from afm_scan_ros.files.plant_file import load_plant
 from helpers.in_process import ALL, default_model, scan
 
 SPEC = ScanSpec(line_rate=5.0, lines=6, samples_per_line=4000)
-HOPELESS = 370.0
+HOPELESS = 100.0
 """Cost (nat) beyond the best that no fit makes up for."""
 SOME = ("delay", "drift", "input_lag", "rate_dependent_hysteresis", "slow_creep")
 CHAINS = {axis: chain_of(default_model().axis(axis)) for axis in AXES}

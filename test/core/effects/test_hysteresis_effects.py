@@ -145,6 +145,22 @@ def test_the_direct_inverse_stays_as_good_when_loops_get_weaker() -> None:
     assert direct_error(weaker.model.hysteresis, weaker.model.hysteresis.direct) <= 1.05 * own
 
 
+@pytest.mark.parametrize(("gain", "memory"), [(0.9, 1.0), (1.0, 1.3), (0.9, 1.3)])
+def test_polarisation_changes_gain_and_memory(gain: float, memory: float) -> None:
+    """F = k (R + m H): of both factors it is k times R and k m times H."""
+    chain = Chain(paper.axis())
+    shift = effect_type("parameter_shift")
+    drive = 3.0 * np.sin(np.linspace(0.0, 12.0, 3000))
+    both = shift.form("polarisation").insert(chain, np.array([gain, memory]))
+    apart = shift.form("gain").insert(
+        shift.form("hysteresis").insert(chain, np.array([memory])), np.array([gain])
+    )
+    models = [each.forward(PERIOD) for each in (both, apart, chain)]
+    moved, expected, before = (model.apply(model.at_rest(), drive)[1] for model in models)
+    np.testing.assert_allclose(moved, expected, rtol=1e-12)
+    assert np.ptp(moved - before) > 0.02 * np.ptp(before)
+
+
 def film(drive: np.ndarray, lag: float) -> np.ndarray:
     """What a film adds, by its equation: plays of the surface's own cells, in many small steps."""
     levels, falls = SURFACE.levels, 2.0 * SURFACE.values
