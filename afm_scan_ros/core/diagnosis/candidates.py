@@ -228,7 +228,7 @@ class CandidateFitter:
         forms = self._forms(candidates)
         evidence: Sequence[Evidence] = self.evidence
         begun = inserted(self.chain, forms, rows).of_record(0)
-        disturbed = repeating(begun) != begun
+        disturbed = repeating(begun, self.chain.model.creep) != begun
         seen = Evidence.whitened if disturbed else Evidence.whitened_along
         trial = None
         for _ in range(SEARCH.reweightings):

@@ -24,7 +24,7 @@ from afm_scan_ros.core.diagnosis.records import Playback
 from afm_scan_ros.core.diagnosis.settings import DECIMATION, EVIDENCE, LIMIT, VARIANCE
 from afm_scan_ros.core.diagnosis.tones import lasting_lines
 from afm_scan_ros.core.diagnosis.variance import CellVariance
-from afm_scan_ros.core.effects.creep import Creep
+from afm_scan_ros.core.effects.creep import Creep, CreepModel
 from afm_scan_ros.core.effects.drift import Drift
 from afm_scan_ros.core.effects.periodic_disturbance import Disturbance
 from afm_scan_ros.core.effects.slow_creep import NortonCreep
@@ -41,8 +41,8 @@ class Evidence:
     residual in them. ``weights`` (cells,) in 1/m² are those of least squares, by default for a
     residual as expected. ``between`` (l,) are the coefficients between the harmonics of what the
     model leaves without what never repeats. Only that changes them: what the motion changes there
-    is the model's error before it is an effect. ``fitted`` (n,) are the samples of every other
-    stretch.
+    is the model's error before it is an effect. ``creep`` is the model's own. ``fitted`` (n,) are
+    the samples of every other stretch.
     """
 
     playback: Playback
@@ -53,6 +53,7 @@ class Evidence:
     variance: CellVariance = field()
     weights: Array = field()
     between: Array = field(factory=lambda: np.empty(0))
+    creep: CreepModel | None = None
     fitted: NDArray[np.bool_] = field(init=False)
 
     @base.default
@@ -84,6 +85,8 @@ class Evidence:
 
     def with_cells(self, cells: RecordCells, chain: Chain) -> "Evidence":
         """The same evidence by other cells, with the variance that a chain's residual tells."""
+        if self.creep is None:
+            return evolve(self, creep=chain.model.creep).with_cells(cells, chain)
         moved, residual = self.playback.displacement(chain), self.residual(chain)
         if self.still(chain):
             variance = CellVariance.at_rest(self.limit, self.cells, moved, self.known_from)
@@ -147,7 +150,7 @@ class Evidence:
     def _disturbance(self, chain: Chain) -> Array:
         """Displacement (n,) in m by what never repeats in a chain, whatever it does besides."""
         chain = chain.of_record(self.playback.view.number)
-        without = repeating(chain)
+        without = repeating(chain, self.creep or chain.model.creep)
         if without == chain:
             return np.zeros(len(self.playback.view.drive))
         return self.playback.displacement(chain) - self._without.displacement(without)
@@ -188,13 +191,14 @@ UNREPEATED = Disturbance, Drift, Creep, NortonCreep
 """Elements whose motion does not repeat with the drive's."""
 
 
-def repeating(chain: Chain) -> Chain:
-    """Return the chain of one record without elements of unrepeated motion, if it has any."""
+def repeating(chain: Chain, creep: CreepModel) -> Chain:
+    """Return the chain of one record with some creep, and no elements of unrepeated motion."""
     drive, output = (
         tuple(each for each in elements if getattr(each, "make", None) not in UNREPEATED)
         for elements in (chain.drive, chain.output)
     )
-    return evolve(chain, drive=drive, output=output)
+    left = evolve(chain, drive=drive, output=output)
+    return left if chain.model.creep == creep else left.with_model(creep=creep)
 
 
 def decimated(evidence: Evidence, chain: Chain) -> Evidence:
