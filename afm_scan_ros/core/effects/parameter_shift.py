@@ -154,6 +154,7 @@ def parameter_shift() -> EffectType:
                 POLARISATION,
                 insert_polarisation,
                 example=(0.95, 1.2),
+                refines="hysteresis",
             ),
         ),
         feedback=LINEAR,
