@@ -47,6 +47,11 @@ Plot = Any
 TOLD = "told"
 """Tag of what shows its values beside the cursor."""
 
+KEEP_SHAPE = """
+const around = cb_obj.outer_height - cb_obj.inner_height
+cb_obj.height = Math.round(cb_obj.inner_width / shape + around)
+"""
+"""Gives an image its shape, how wide it is over how high, whatever the page's width."""
 PICK_LINE = """
 const [bottom, top] = line.tags, controls = [...document.querySelectorAll("[data-line-of]")];
 const control = controls.find(each => line.name === `line of ${each.dataset.lineOf}`);
@@ -130,7 +135,7 @@ class _Drawing:
             y_axis_label=panel.y,
             x_axis_type="datetime" if panel.dates else _scale(panel, "x"),
             y_axis_type=_scale(panel, "y"),
-            **self._size(panel),
+            height=round(DRAWING.row * self.picture.height),
             sizing_mode="stretch_width",
             tools=TOOLS,
             active_drag="auto_box_zoom",
@@ -144,20 +149,15 @@ class _Drawing:
             plot.hspan([panel.level], line_color=GREY)
         for mark in panel.marks:
             self._add(mark, plot)
+        if panel.maps and panel.x[1:] == panel.y[1:]:
+            left, right, bottom, top = panel.maps[0].span
+            shape = max((right - left) / (top - bottom), 1.0 / DRAWING.longest)
+            args = {"shape": min(shape, DRAWING.longest)}
+            plot.js_on_change("inner_width", CustomJS(args=args, code=KEEP_SHAPE))
         if panel.maps and (count := self.picture.lines):
             self._pick_line(plot, panel.maps[0], count)
         self._tell(plot, panel)
         return plot
-
-    def _size(self, panel: Panel) -> dict[str, Any]:
-        """Height of a panel, or the aspect of an image in one unit of length."""
-        for of in panel.maps:
-            left, right, bottom, top = of.span
-            if panel.x[1:] == panel.y[1:]:
-                shape = (right - left) / (top - bottom)
-                shape = min(max(shape, 1.0 / DRAWING.longest), DRAWING.longest)
-                return {"aspect_ratio": DRAWING.image * shape}
-        return {"height": round(DRAWING.row * self.picture.height)}
 
     def _add(self, mark: Mark, plot: Plot) -> None:
         source = self._image(mark) if isinstance(mark, Map) else _source_of(mark)

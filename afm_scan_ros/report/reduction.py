@@ -33,12 +33,6 @@ class DrawingSettings:
         "in a line of the image of an error, at most",
         "the errors of both axes on trace and retrace take 700 kB",
     )
-    image: float = setting(
-        1.25,
-        "1",
-        "aspect of the panel of a square image",
-        "a colour bar and numbers at its sides need more room than those below",
-    )
     longest: float = setting(
         3.0, "1", "sides of an image, at most; longer ones are squeezed", "an image stays legible"
     )

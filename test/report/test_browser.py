@@ -12,7 +12,7 @@ import pytest
 from attrs import evolve
 
 from afm_scan_ros.report.page import ReportPage
-from afm_scan_ros.report.picture import Curve, Panel, Picture
+from afm_scan_ros.report.picture import Curve, Map, Panel, Picture
 from helpers.given_commands import refuse_unknown
 from helpers.report_pages import REPORTS, SPEC, of_scan, of_survey, recorded
 
@@ -203,6 +203,25 @@ def test_an_offset_is_seen_as_one(page: Page, folder: Path) -> None:
     )
     assert start <= 0.0
     assert end >= 51.0
+
+
+@pytest.mark.parametrize("view", [DESK, PHONE], ids=["desk", "phone"])
+@pytest.mark.parametrize(("wide", "shape"), [(20.0, 1.0), (40.0, 2.0), (2000.0, 3.0)])
+def test_pixels_of_an_image_are_square(
+    page: Page, folder: Path, view: ViewportSize, wide: float, shape: float
+) -> None:
+    """But for an image so long that it would be a line."""
+    image = Map(np.eye(8), (0.0, wide, 0.0, 20.0), "height in nm", 0.0, 1.0)
+    picture = Picture("image", "", [[Panel([image], "x in µm", "y in µm")] * 2])
+    file = folder / "image.html"
+    ReportPage("Image", ["An answer."], picture, [], []).write(file, None)
+    page.set_viewport_size(view)
+    opened(page, file)
+    across, up = page.evaluate(
+        "() => { const of = plotOf(document.querySelector('.panel'));"
+        " return [of.inner_width, of.inner_height]; }"
+    )
+    assert across / up == pytest.approx(shape, rel=0.02)
 
 
 @pytest.mark.evidence

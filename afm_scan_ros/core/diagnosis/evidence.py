@@ -41,8 +41,8 @@ class Evidence:
     residual in them. ``weights`` (cells,) in 1/m² are those of least squares, by default for a
     residual as expected. ``between`` (l,) are the coefficients between the harmonics of what the
     model leaves without what never repeats. Only that changes them: what the motion changes there
-    is the model's error before it is an effect. ``creep`` is the model's own. ``fitted`` (n,) are
-    the samples of every other stretch.
+    is the model's error before it is an effect. ``creep`` is the creep of that model. ``fitted``
+    (n,) are the samples of every other stretch.
     """
 
     playback: Playback
@@ -85,8 +85,6 @@ class Evidence:
 
     def with_cells(self, cells: RecordCells, chain: Chain) -> "Evidence":
         """The same evidence by other cells, with the variance that a chain's residual tells."""
-        if self.creep is None:
-            return evolve(self, creep=chain.model.creep).with_cells(cells, chain)
         moved, residual = self.playback.displacement(chain), self.residual(chain)
         if self.still(chain):
             variance = CellVariance.at_rest(self.limit, self.cells, moved, self.known_from)
@@ -95,8 +93,14 @@ class Evidence:
             return self
         variance = CellVariance.repeating(self.limit, cells, moved, residual, self.known_from)
         between = cells.between((residual + self._disturbance(chain))[np.newaxis])[0]
-        weights = variance.expected_weights
-        return evolve(self, cells=cells, variance=variance, weights=weights, between=between)
+        return evolve(
+            self,
+            cells=cells,
+            variance=variance,
+            weights=variance.expected_weights,
+            between=between,
+            creep=chain.model.creep,
+        )
 
     def from_depolarised(self, chain: Chain) -> "Evidence":
         """The same evidence with a depolarised scanner at the record's start."""
