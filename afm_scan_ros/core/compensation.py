@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from afm_scan_ros.core.correction import Correction, Stop
 from afm_scan_ros.core.effects.optimal_inverse import OptimalInverses
@@ -272,4 +272,4 @@ def _drivable(
 
 
 def _ranged(spec: ScanSpec, ranges: Ranges) -> ScanSpec:
-    return evolve(spec, range_x=ranges["x"], range_y=ranges["y"])
+    return spec.resized(ranges["x"], ranges["y"])

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from typing import Any
 
-from attrs import Attribute, field, fields, frozen
+from attrs import Attribute, evolve, field, fields, frozen
 from attrs.validators import ge, gt, in_, le, lt
 
 from afm_scan_ros.core.errors import InputError
@@ -97,10 +97,10 @@ class ScanSpec:
         "depolarise", "How the scanner's memory is set before the scan", in_(PREPARATIONS)
     )
     preparation_lower: float = parameter(
-        -28e-6, "Lowest displacement of the preparation", suffix="_um"
+        0.0, "Lowest displacement of the preparation; 0: 0.6 of the larger range down", suffix="_um"
     )
     preparation_upper: float = parameter(
-        25e-6, "Highest displacement of the preparation", suffix="_um"
+        0.0, "Highest displacement of the preparation; 0: 0.6 of the larger range up", suffix="_um"
     )
     preparation_rate: float = parameter(
         10.0, "Oscillations of the preparation a second", gt(0.0), suffix="_hz"
@@ -112,6 +112,9 @@ class ScanSpec:
     settle: float = parameter(0.1, "Time from the last line to rest at zero", gt(0.0), suffix="_s")
 
     def __attrs_post_init__(self) -> None:
+        for name, end in self._preparation_of_range().items():
+            if getattr(self, name) == 0.0:
+                object.__setattr__(self, name, end)
         _refuse(
             self.samples_per_line % 2 == 1,
             f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"
@@ -166,6 +169,24 @@ class ScanSpec:
             f"y_step = {self.y_step:g} s is shorter than one sample, so y would jump:"
             f" give at least {self.sample_period:g} s or more samples_per_line",
         )
+
+    def _preparation_of_range(self) -> dict[str, float]:
+        """Ends of a preparation, m, where nothing states them.
+
+        It has to go farther than the scan, and to stay within the 1.4 times its range that a
+        calibration drives, with the width of the hysteresis and what compensation adds.
+        """
+        end = 0.6 * max(self.range_x, self.range_y)
+        return {"preparation_lower": -end, "preparation_upper": end}
+
+    def resized(self, range_x: float, range_y: float) -> "ScanSpec":
+        """Return the scan with other ranges, m, which its preparation follows if it does these."""
+        lower, upper = (
+            0.0 if getattr(self, name) == end else getattr(self, name)
+            for name, end in self._preparation_of_range().items()
+        )
+        ranged = evolve(self, range_x=range_x, range_y=range_y)
+        return evolve(ranged, preparation_lower=lower, preparation_upper=upper)
 
     @property
     def sample_period(self) -> float:

@@ -21,7 +21,7 @@ from afm_scan_ros.simulation.scanner import Piezoscanner, PlantSpec
 
 SEED = 1
 ALL = ("creep", "hysteresis", "vibration")
-BENCH_SPEC = ScanSpec(lines=6)
+BENCH_SPEC = ScanSpec(lines=6, preparation_lower=-28e-6, preparation_upper=25e-6)
 SAMPLES_AND_TURNAROUND = {
     1.0: (20_000, 0.1),
     5.0: (4_000, 0.1),

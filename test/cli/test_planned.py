@@ -14,16 +14,23 @@ from afm_scan_ros.bag.reader import read_scan
 from afm_scan_ros.bag.writer import write_record
 from afm_scan_ros.cli import calibrate as command
 from afm_scan_ros.cli.driving import DrivenScanner
+from afm_scan_ros.cli.main import cli
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.scan_info import ScanInfo
 from afm_scan_ros.core.types import Trace
 from afm_scan_ros.files import share_directory
+from afm_scan_ros.report.analysis import analyse
 from helpers.in_process import default_plant, drive_through
 
 SMALL = ["--range", "40um", "--rate", "2.5kHz", "--hold", "10s"]
 """Of the default plant, sampled as slowly as its resonance allows."""
 MODEL = ["--model", str(share_directory() / "config/model.yaml")]
+SCAN = """\
+/**/trajectory_generator:
+  ros__parameters: {range_x_um: 20.0, range_y_um: 20.0, line_rate_hz: 20.0, lines: 4,
+    samples_per_line: 1000}
+"""
 SETTINGS = """\
 amplifier: {voltage_limit_v: 3.0, slew_limit_v_per_s: 20.0, ramp_down_slew_v_per_s: 20.0}
 x: {sensor_scale_m_per_v: 1.0, sensor_offset_v: 0.0, sensor_low_v: -1.0, sensor_high_v: 1.0}
@@ -148,3 +155,22 @@ def test_what_a_real_scanner_lacks_is_asked_for(
     assert isinstance(done.exception, UsageError)
     assert said in done.exception.message
     assert not scanner.plans
+
+
+@pytest.mark.evidence
+def test_a_scan_as_large_as_the_calibration_was_for_is_compensated(tmp_path: Path) -> None:
+    """By the commands of the guide, of a scan file that states no preparation."""
+    bags, model, scanned = tmp_path / "calibration", tmp_path / "model.yaml", tmp_path / "scanned"
+    (spec := tmp_path / "scan.yaml").write_text(SCAN, "utf-8")
+    records = [bags / "survey", bags / "hysteresis", "--validation", bags / "validation"]
+    for words in (
+        ["calibrate", "--range", "20um", "--limit", "4V", "--rate", "20kHz", "--out", bags],
+        ["identify", *records, "--out", model],
+        ["scan", "--spec", spec, "--model", model, "--bag", scanned],
+    ):
+        done = CliRunner().invoke(cli, [str(word) for word in words])
+        assert done.exit_code == 0, done.output
+    true = analyse(read_scan(scanned)).true
+    assert true is not None
+    errors = [axis.constant_speed for axis in (true.x, true.y)]
+    assert max(each.rms_share for each in errors if each) < 1e-3

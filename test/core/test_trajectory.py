@@ -253,6 +253,19 @@ def test_a_depolarisation_reaches_its_bounds_and_decays() -> None:
     assert np.all(np.diff(peaks[2:]) < 0.0)
 
 
+@given(st.floats(1e-7, 1e-4), st.floats(1e-7, 1e-4), st.floats(0.01, 1.0))
+def test_a_preparation_follows_the_range_unless_it_is_stated(
+    x: float, y: float, part: float
+) -> None:
+    spec = ScanSpec(range_x=x, range_y=y)
+    ends = np.array([-spec.preparation_lower, spec.preparation_upper])
+    assert ends == pytest.approx(0.6 * max(x, y), rel=1e-15)
+    assert spec.resized(part * x, part * y) == ScanSpec(range_x=part * x, range_y=part * y)
+    stated = evolve(spec, preparation_lower=-3.0 * x).resized(part * x, part * y)
+    assert stated.preparation_lower == -3.0 * x
+    assert stated.preparation_upper == 0.6 * max(part * x, part * y)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
