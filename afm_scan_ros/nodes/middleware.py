@@ -5,6 +5,7 @@ What a user has set prevails. It is checked for what a scan needs.
 
 import os
 import shutil
+import socket
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
@@ -20,8 +21,8 @@ def prepare(
 ) -> list[str]:
     """Set the middleware up and clear what dead processes left; return warnings, a sentence each.
 
-    Who is only ``viewing`` gets no shared memory with Fast DDS, where the nodes are known to be on
-    this computer: Fast DDS at times waits 2 s to send to a process with such that was stopped.
+    Fast DDS gets no shared memory where sockets hold what a scan has in flight, nor for who is only
+    ``viewing``: with it, Fast DDS at times waits 2 s to send to a process that was stopped.
 
     Call it before ``rclpy.init``, and write the warnings before it too: a file in shared memory
     that could not be removed may hang it. Raises FileNotFoundError for a broken installation.
@@ -30,7 +31,10 @@ def prepare(
     if name == CYCLONE:
         return _prepare_cyclone(environment)
     if name == FAST_DDS:
-        return [*_prepare_fast_dds(environment, viewing=viewing), *clear(), *lacks_room()]
+        said = [*_prepare_fast_dds(environment, viewing=viewing), *clear()]
+        return (
+            said if Path(environment.get(PROFILES, "")).name in UDP_ALONE else said + lacks_room()
+        )
     tried = f"{FAST_DDS} and {CYCLONE} were"
     return [f"RMW_IMPLEMENTATION={name} was not tried with this package; {tried}"]
 
@@ -75,7 +79,7 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 """Variable that Fast DDS 2.14 reads, when the first participant is made."""
 NEWER = "FASTDDS_DEFAULT_PROFILES_FILE"
@@ -94,6 +98,13 @@ REPEAT = 0.1
 KEPT = 15_000
 """Messages that a writer keeps for a reader that does not acknowledge."""
 
+SHARED = "fastdds.xml"
+"""Our profile with shared memory and UDP."""
+UDP_ALONE = NETWORK, COMPUTER = "fastdds_udp.xml", "fastdds_local.xml"
+"""Our profiles without shared memory: for all networks, and for this computer alone."""
+IN_FLIGHT = 4 * 2**20
+"""Bytes that a socket has to hold; config/fastdds_udp.xml argues this."""
+
 _HOLDS_UP = "a viewer that is slow, stopped or killed can hold up the scan"
 
 
@@ -109,11 +120,32 @@ def _prepare_fast_dds(environment: MutableMapping[str, str], *, viewing: bool) -
     if environment.get("SKIP_DEFAULT_XML_FILE") != "1" and Path(LOCAL).is_file():
         files.append(Path(LOCAL).absolute())
     if not files:
-        environment[PROFILES] = str(ours / "fastdds.xml")
-        if viewing and environment.get(RANGE) == "LOCALHOST":
-            environment[PROFILES] = str(ours / "fastdds_viewer.xml")
-            environment[RANGE] = "SYSTEM_DEFAULT"  # ROS adds shared memory for LOCALHOST
+        environment[PROFILES] = str(ours / _profile(environment, viewing=viewing))
     return [*said, *(sentence for file in files for sentence in lacking(file, environment))]
+
+
+def _profile(environment: MutableMapping[str, str], *, viewing: bool) -> str:
+    """Return the name of our profile for the discovery that ROS is asked for.
+
+    ROS adds shared memory for LOCALHOST whatever a profile says, so that the profile takes over
+    what that range means, unless it is asked for in a way that a profile cannot.
+    """
+    local = environment.get(RANGE) == "LOCALHOST" or environment.get(PROFILES, "").endswith(
+        COMPUTER
+    )
+    by_ros = environment.get("ROS_LOCALHOST_ONLY") == "1" or (local and environment.get(PEERS))
+    if by_ros or not (viewing or sockets_hold(IN_FLIGHT)):
+        return SHARED
+    if local:
+        environment[RANGE] = "SYSTEM_DEFAULT"
+    return COMPUTER if local else NETWORK
+
+
+def sockets_hold(size: int) -> bool:
+    """Return whether the system lets a socket receive so many bytes before anybody reads them."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
+        return probe.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) >= size
 
 
 def lacks_room(memory: Path = MEMORY) -> list[str]:

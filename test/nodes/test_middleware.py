@@ -16,20 +16,26 @@ from hypothesis import strategies as st
 from afm_scan_ros.files import share_directory
 from afm_scan_ros.nodes import middleware
 from afm_scan_ros.nodes.middleware import (
+    COMPUTER,
     CYCLONE,
     CYCLONE_SETTINGS,
     FAST_DDS,
     HEARTBEAT,
+    IN_FLIGHT,
     KEPT,
     LOCAL,
+    NETWORK,
     NEWER,
+    PEERS,
     PROFILES,
     RANGE,
     SEGMENT,
+    UDP_ALONE,
     URI,
     lacking,
     lacks_room,
     prepare,
+    sockets_hold,
 )
 from afm_scan_ros.nodes.scan_node import COMMON
 
@@ -39,7 +45,8 @@ XMLNS = ' xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"'
 
 @pytest.fixture(autouse=True)
 def empty_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Leave this computer's shared memory and the current folder alone."""
+    """Leave this computer's shared memory, sockets and the current folder alone."""
+    monkeypatch.setattr(middleware, "sockets_hold", lambda _: False)
     monkeypatch.setattr(middleware, "clear", list)
     monkeypatch.setattr(middleware, "lacks_room", list)
     monkeypatch.chdir(tmp_path)
@@ -161,15 +168,58 @@ def test_fast_dds_gets_our_profile_and_again_no_other() -> None:
         assert environment == {PROFILES: str(OURS)}
 
 
-def test_a_viewer_of_a_node_has_no_shared_memory() -> None:
-    environment = {RANGE: "LOCALHOST"}
-    prepare(environment)
-    assert prepare(environment, viewing=True) == []
-    assert environment[RANGE] != "LOCALHOST"
-    file = Path(environment[PROFILES])
+@pytest.mark.parametrize("viewing", [False, True])
+@pytest.mark.parametrize(
+    ("asked", "name", "reach"),
+    [
+        ({}, NETWORK, None),
+        ({RANGE: "SUBNET", PEERS: "10.0.0.2"}, NETWORK, "SUBNET"),
+        ({RANGE: "LOCALHOST"}, COMPUTER, "SYSTEM_DEFAULT"),
+    ],
+)
+def test_no_queue_in_shared_memory_where_sockets_hold_what_is_in_flight(
+    monkeypatch: pytest.MonkeyPatch,
+    asked: dict[str, str],
+    name: str,
+    reach: str | None,
+    *,
+    viewing: bool,
+) -> None:
+    monkeypatch.setattr(middleware, "sockets_hold", lambda size: viewing or size <= IN_FLIGHT)
+    environment = dict(asked)
+    for _ in range(2):  # a process that a node's process starts finds what that one has set
+        assert prepare(environment, viewing=viewing) == []
+        assert environment == asked | {PROFILES: str(OURS.with_name(name))} | (
+            {RANGE: reach} if reach else {}
+        )
+
+
+@pytest.mark.parametrize(
+    "asked", [{RANGE: "LOCALHOST", PEERS: "10.0.0.2"}, {"ROS_LOCALHOST_ONLY": "1"}]
+)
+def test_ros_keeps_a_reach_that_a_profile_cannot_give(
+    monkeypatch: pytest.MonkeyPatch, asked: dict[str, str]
+) -> None:
+    monkeypatch.setattr(middleware, "sockets_hold", lambda _: True)
+    environment = dict(asked)
+    assert prepare(environment) == []
+    assert environment == asked | {PROFILES: str(OURS)}
+
+
+def test_what_a_socket_holds_is_the_systems_to_say() -> None:
+    least = int(Path("/proc/sys/net/core/rmem_max").read_text("ascii"))
+    assert sockets_hold(least)
+    assert not sockets_hold(2 * least + 2)
+
+
+@pytest.mark.parametrize("name", UDP_ALONE)
+def test_profiles_without_shared_memory_give_what_a_scan_needs(name: str) -> None:
+    file = OURS.with_name(name)
     tree = ET.parse(file)  # noqa: S314 - our own file
-    kinds = [element.text for element in tree.iter() if element.tag.endswith("}type")]
-    assert kinds == ["UDPv4"]
+    assert [element.text for element in tree.iterfind(".//{*}type")] == ["UDPv4"]
+    assert lacking(file, {RANGE: "SYSTEM_DEFAULT"}) == []
+    sizes = [int(size.text or 0) for size in tree.iterfind(".//{*}receiveBufferSize")]
+    assert sizes == [IN_FLIGHT]
 
 
 def test_a_users_profile_stays_and_is_checked(tmp_path: Path) -> None:
@@ -232,31 +282,36 @@ def test_another_middleware_is_said_not_to_have_been_tried() -> None:
 
 JOIN = """\
 from afm_scan_ros.nodes import middleware
+middleware.sockets_hold = lambda size: {}
 middleware.prepare()
 import rclpy
 rclpy.init()
 node = rclpy.create_node("joined")
 mapped = [line for line in open("/proc/self/maps") if "/dev/shm/fastrtps_" in line]
 ends = [[int(end, 16) for end in line.split()[0].split("-")] for line in mapped]
-print(max(last - first for first, last in ends))
+print(max((last - first for first, last in ends), default=0))
 """
 
 
-def test_fast_dds_reads_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("reach", "holds"), [("LOCALHOST", True), ("SUBNET", True), ("", False)])
+def test_fast_dds_reads_the_profile(
+    monkeypatch: pytest.MonkeyPatch, reach: str, *, holds: bool
+) -> None:
     """It takes all of a file or nothing; the size of the shared memory tells."""
     pytest.importorskip("rclpy")
     monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
     monkeypatch.delenv(PROFILES, raising=False)
+    monkeypatch.setenv(RANGE, reach)
     path = os.pathsep.join(map(os.path.abspath, sys.path))  # seen from this test's folder
     done = subprocess.run(
-        [sys.executable, "-c", JOIN],
+        [sys.executable, "-c", JOIN.format(holds)],
         capture_output=True,
         text=True,
         timeout=60,
         check=True,
         env={**os.environ, "PYTHONPATH": path},
     )
-    assert int(done.stdout) >= SEGMENT
+    assert int(done.stdout) == 0 if holds else int(done.stdout) >= SEGMENT
 
 
 def test_the_limits_are_those_that_the_window_asks_for() -> None:

@@ -12,6 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from afm_scan_bench.faults.injection.processes import FORKING, Forked
 from afm_scan_ros.nodes.messages import Message
+from afm_scan_ros.nodes.middleware import PROFILES, RANGE
 from afm_scan_ros.nodes.topics import (
     BLOCKS,
     MODEL_RESIDUAL,
@@ -54,7 +55,10 @@ def start(output: Path) -> Forked:
 
 
 def _view(environment: dict[str, str], output: Path) -> None:
+    """Join with what ROS itself sets of DDS, as RViz does, not with what our nodes set."""
     os.environ.update(environment)
+    os.environ.pop(PROFILES, None)
+    os.environ[RANGE] = "LOCALHOST"
     os.dup2(os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     rclpy.spin(Viewer())
