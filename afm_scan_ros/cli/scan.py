@@ -1,6 +1,5 @@
 """``afm-scan scan``: one scan, by nodes or in this process, recorded in a bag."""
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -120,30 +119,24 @@ def _own(
 ) -> dict[str, orders.Parameters]:
     """Parameters of the compensator and the monitor, before those of their files."""
     learned = {"learned_file": str(files.learned)} if files.learned else {}
-    own = {**learned, **online, **_tighter_limits(scanner)}
+    own = {**learned, **online, **_limits(scanner)}
     tracked = {name: online[name] for name, each in ONLINE.items() if each.tracker}
     return {orders.COMPENSATOR: own, orders.MONITOR: tracked}
 
 
-def _tighter_limits(scanner: ScannerChoice) -> orders.Parameters:
-    """Limits of the scanner below the compensator's, to refuse a scan before it moves."""
+def _limits(scanner: ScannerChoice) -> orders.Parameters:
+    """Limits of the scanner, for the compensator to refuse a scan by before it moves."""
     if (limits := scanner.limits) is None:
         return {}
-    own = orders.parameters_of(orders.COMPENSATOR)
-    theirs = {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
-    return {name: value for name, value in theirs.items() if value < own.get(name, math.inf)}
+    return {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
 
 
 def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:
-    """Limits of a scan's drive: the compensator's, or the scanner's where these are tighter.
-
-    Those of an external scanner are not known.
-    """
+    """Limits of a scan's drive: the scanner's, or the compensator's where these are not known."""
+    if (amplifier := amplifier_of(scanner, plant)) is not None:
+        return amplifier.limits
     own = orders.parameters_of(orders.COMPENSATOR)
-    voltage, slew = float(own["voltage_limit_v"]), float(own["slew_limit_v_per_s"])
-    if (amplifier := amplifier_of(scanner, plant)) is None:
-        return DriveLimits(voltage, slew)
-    return DriveLimits(min(voltage, amplifier.voltage_limit), min(slew, amplifier.slew_limit))
+    return DriveLimits(float(own["voltage_limit_v"]), float(own["slew_limit_v_per_s"]))
 
 
 def _options_of_features(command: Callable[..., None]) -> Callable[..., None]:

@@ -123,15 +123,17 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
         return _external()
     if scanner == SIM:
         limits = load_plant(plant).amplifier.limits
-        return ScannerChoice(SIM_NODE, {"plant_file": str(plant)}, limits, knows_true=True)
+        voltage, slew = limits.voltage, limits.slew
+        own = {"plant_file": str(plant), "voltage_limit_v": voltage, "slew_limit_v_per_s": slew}
+        return ScannerChoice(SIM_NODE, own, limits, knows_true=True)
     driver, file = driver_and_file(scanner)
     settings = load_settings(driver, file).settings
     source = {
         "sampling_instant": settings.sampling_instant,
         "trigger_offset_s": settings.trigger_offset,
     }
-    own = {"driver": driver, "settings_file": str(file)}
-    return ScannerChoice(DRIVER_NODE, own, settings.amplifier.limits, source=source)
+    of_driver = {"driver": driver, "settings_file": str(file)}
+    return ScannerChoice(DRIVER_NODE, of_driver, settings.amplifier.limits, source=source)
 
 
 def _external() -> ScannerChoice:

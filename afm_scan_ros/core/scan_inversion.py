@@ -138,7 +138,7 @@ class ScanInversion:
             yield from preflight(self._compensation, self._spec, samples)
         except ScanError as error:
             found = yield from largest_ranges(self._compensation, self._spec, samples)
-            raise ScanError(f"{error}; {_advice(found)}") from error
+            raise ScanError(f"{error}; {_advice(self._spec, found)}") from error
 
     def desired(self, block: Trace, *, last: bool) -> Iterator[Trace]:
         """Take the next desired block, the ``last`` or not; yield the drive, or raise ScanError."""
@@ -183,11 +183,16 @@ class ScanInversion:
         return Trace(drive.first_sample, drive.sample_period, x, y)
 
 
-def _advice(ranges: Ranges) -> str:
+def _advice(spec: ScanSpec, ranges: Ranges) -> str:
     if not ranges:
-        return "no range is possible, for the preparation alone goes beyond"
+        return (
+            "no range is possible, for the preparation alone goes beyond: give preparation_lower_um"
+            " and preparation_upper_um nearer to zero"
+        )
     largest = ", ".join(f"{axis} {_rounded_down(1e6 * each):g} µm" for axis, each in ranges.items())
-    return f"the largest range of this scan: {largest}"
+    steps = ranges["y"] < spec.range_y and spec.pattern in {"raster", "sinusoidal"}
+    longer = ", farther in y with a longer y_step_ms" if steps else ""
+    return f"the largest range of this scan: {largest}{longer}"
 
 
 def _rounded_down(value: float) -> float:
