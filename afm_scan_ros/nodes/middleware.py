@@ -102,8 +102,6 @@ SHARED = "fastdds.xml"
 """Our profile with shared memory and UDP."""
 UDP_ALONE = NETWORK, COMPUTER = "fastdds_udp.xml", "fastdds_local.xml"
 """Our profiles without shared memory: for all networks, and for this computer alone."""
-IN_FLIGHT = 4 * 2**20
-"""Bytes that a socket has to hold; config/fastdds_udp.xml argues this."""
 
 _HOLDS_UP = "a viewer that is slow, stopped or killed can hold up the scan"
 
@@ -134,11 +132,17 @@ def _profile(environment: MutableMapping[str, str], *, viewing: bool) -> str:
         COMPUTER
     )
     by_ros = environment.get("ROS_LOCALHOST_ONLY") == "1" or (local and environment.get(PEERS))
-    if by_ros or not (viewing or sockets_hold(IN_FLIGHT)):
+    if by_ros or not (viewing or sockets_hold(in_flight())):
         return SHARED
     if local:
         environment[RANGE] = "SYSTEM_DEFAULT"
     return COMPUTER if local else NETWORK
+
+
+def in_flight() -> int:
+    """Bytes that a socket has to hold; the profile argues this."""
+    tree = ET.parse(share_directory() / "config" / NETWORK)  # noqa: S314 - our own file
+    return int(tree.findtext(".//{*}receiveBufferSize", ""))
 
 
 def sockets_hold(size: int) -> bool:

@@ -14,7 +14,14 @@ from afm_scan_ros.core.types import Trace
 from afm_scan_ros.simulation.sample import HeightMap
 
 SPEC = ScanSpec(
-    range_x=10e-6, range_y=10e-6, line_rate=50.0, lines=3, samples_per_line=200, approach=0.01
+    range_x=10e-6,
+    range_y=10e-6,
+    line_rate=50.0,
+    lines=3,
+    samples_per_line=200,
+    preparation_lower=-14e-6,
+    preparation_upper=14e-6,
+    approach=0.01,
 )
 TOTAL = total_samples(SPEC)
 PATH = desired(SPEC, 0, TOTAL)

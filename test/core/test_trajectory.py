@@ -261,8 +261,8 @@ def test_a_preparation_follows_the_range_unless_it_is_stated(
     ends = np.array([-spec.preparation_lower, spec.preparation_upper])
     assert ends == pytest.approx(0.6 * max(x, y), rel=1e-15)
     assert spec.resized(part * x, part * y) == ScanSpec(range_x=part * x, range_y=part * y)
-    stated = evolve(spec, preparation_lower=-3.0 * x).resized(part * x, part * y)
-    assert stated.preparation_lower == -3.0 * x
+    stated = evolve(spec, preparation_lower=-(x + y)).resized(part * x, part * y)
+    assert stated.preparation_lower == -(x + y)
     assert stated.preparation_upper == 0.6 * max(part * x, part * y)
 
 

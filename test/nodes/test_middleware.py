@@ -21,7 +21,6 @@ from afm_scan_ros.nodes.middleware import (
     CYCLONE_SETTINGS,
     FAST_DDS,
     HEARTBEAT,
-    IN_FLIGHT,
     KEPT,
     LOCAL,
     NETWORK,
@@ -32,6 +31,7 @@ from afm_scan_ros.nodes.middleware import (
     SEGMENT,
     UDP_ALONE,
     URI,
+    in_flight,
     lacking,
     lacks_room,
     prepare,
@@ -185,7 +185,7 @@ def test_no_queue_in_shared_memory_where_sockets_hold_what_is_in_flight(
     *,
     viewing: bool,
 ) -> None:
-    monkeypatch.setattr(middleware, "sockets_hold", lambda size: viewing or size <= IN_FLIGHT)
+    monkeypatch.setattr(middleware, "sockets_hold", lambda size: viewing or size <= 4 * 2**20)
     environment = dict(asked)
     for _ in range(2):  # a process that a node's process starts finds what that one has set
         assert prepare(environment, viewing=viewing) == []
@@ -219,7 +219,7 @@ def test_profiles_without_shared_memory_give_what_a_scan_needs(name: str) -> Non
     assert [element.text for element in tree.iterfind(".//{*}type")] == ["UDPv4"]
     assert lacking(file, {RANGE: "SYSTEM_DEFAULT"}) == []
     sizes = [int(size.text or 0) for size in tree.iterfind(".//{*}receiveBufferSize")]
-    assert sizes == [IN_FLIGHT]
+    assert sizes == [in_flight()]
 
 
 def test_a_users_profile_stays_and_is_checked(tmp_path: Path) -> None:

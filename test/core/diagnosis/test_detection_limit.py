@@ -19,7 +19,9 @@ from afm_scan_ros.core.scanner import chain_of
 from afm_scan_ros.core.types import AXES, Array
 from helpers.in_process import InProcessSession, default_model, default_plant
 
-SCAN = ScanSpec(line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
+WIDE = ScanSpec(preparation_lower=-28e-6, preparation_upper=25e-6)
+"""A preparation that sets what the model's own rest is wrong about."""
+SCAN = evolve(WIDE, line_rate=20.0, samples_per_line=500, lines=6, range_x=30e-6, range_y=30e-6)
 SMOOTH = evolve(SCAN, pattern="lissajous")
 CROSSING = evolve(SMOOTH, line_rate=5.0, samples_per_line=4000, lines=12, range_y=38e-6)
 """y crosses the levels of its table up to 450 times a second, where it resonates."""
