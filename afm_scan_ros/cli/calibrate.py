@@ -1,5 +1,6 @@
 """``afm-scan calibrate``: records for the identification, or one experiment."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -144,8 +145,7 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
         planned = driving.PlannedCalibration(
             driven, out, converter, limits, motion, scan_range, wanted.hold, have
         )
-        bags = [*wanted.have, *planned.run()]
-        advice = f"afm-scan identify {' '.join(map(str, bags))} --out model.yaml"
+        advice = _identified([*wanted.have, *planned.run()])
     else:
         plans = _default_drives(driven.scanner, name, known, size, wanted.rate)
         driving.run_calibration(driven, out, plans)
@@ -154,6 +154,13 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
     recorded = f"the simulated scanner of {driven.plant}" if of == SIM else f"scanner {of}"
     click.echo(f"Recorded {recorded} in {out}.")
     click.echo(f"next: {advice}")
+
+
+def _identified(bags: Sequence[Path]) -> str:
+    """Return the command that identifies a model from records, of which one may be held out."""
+    held_out = {bag: "--validation " for bag in bags if bag.name == "validation"}
+    given = " ".join(f"{held_out.get(bag, '')}{bag}" for bag in bags)
+    return f"afm-scan identify {given} --out model.yaml"
 
 
 def _export(

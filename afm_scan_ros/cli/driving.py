@@ -29,7 +29,12 @@ from afm_scan_ros.core.correction import Correction
 from afm_scan_ros.core.identification.drives import proposal
 from afm_scan_ros.core.identification.drives.excitation import Plan, excitation_block
 from afm_scan_ros.core.identification.drives.experiments import peak
-from afm_scan_ros.core.identification.drives.growth import GrowthStep, MotionLimits, grow
+from afm_scan_ros.core.identification.drives.growth import (
+    GrowthStep,
+    MotionLimits,
+    beyond,
+    grow,
+)
 from afm_scan_ros.core.limits import DriveLimits
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.model import INVERSES, ScannerModel
@@ -234,7 +239,9 @@ class PlannedCalibration:
 
     def _next(self, have: proposal.Coverage, done: set[str]) -> proposal.ProposedRecord | None:
         proposed = proposal.propose(self.converter, self.hold, self.scan_range, have)
-        lacking = [record for record in proposed if record.plan.name not in done]
+        far = have.travel >= min(self.scan_range, 0.75 * self.motion.travel)
+        known = {*done, *(["hysteresis"] if far else [])}
+        lacking = [record for record in proposed if record.plan.name not in known]
         return min(lacking, key=lambda record: ORDER.index(record.identifies), default=None)
 
     def _grow(self, record: proposal.ProposedRecord, have: proposal.Coverage) -> None:
@@ -249,6 +256,8 @@ class PlannedCalibration:
         for number, watched in enumerate(grow(record, self._drive, self.motion, have), 1):
             click.echo(plan_text.step_text(name, number, largest, watched))
         click.echo(plan_text.kept_text(name, watched.step))
+        for reached in beyond(watched, self.motion):
+            click.echo(plan_text.beyond_text(name, reached))
         self._rows.append(plan_text.growth_row(name, largest, watched))
 
     def _drive(self, plan: Plan, step: GrowthStep) -> tuple[Trace, Trace]:

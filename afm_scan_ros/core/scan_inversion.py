@@ -190,7 +190,8 @@ def _advice(spec: ScanSpec, ranges: Ranges) -> str:
             " and preparation_upper_um nearer to zero"
         )
     largest = ", ".join(f"{axis} {_rounded_down(1e6 * each):g} µm" for axis, each in ranges.items())
-    steps = ranges["y"] < spec.range_y and spec.pattern in {"raster", "sinusoidal"}
+    alone = ranges["x"] >= spec.range_x and ranges["y"] < spec.range_y
+    steps = alone and spec.pattern in {"raster", "sinusoidal"}
     longer = ", farther in y with a longer y_step_ms" if steps else ""
     return f"the largest range of this scan: {largest}{longer}"
 

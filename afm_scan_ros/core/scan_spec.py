@@ -113,8 +113,15 @@ class ScanSpec:
 
     def __attrs_post_init__(self) -> None:
         for name, end in self._preparation_of_range().items():
-            if getattr(self, name) == 0.0:
+            stated = getattr(self, name)
+            if stated == 0.0:
                 object.__setattr__(self, name, end)
+                continue
+            _refuse(
+                not SMALLEST_RANGE <= abs(stated) <= LARGEST_RANGE,
+                f"{name} = {stated:g} m: give {SMALLEST_RANGE:g} to {LARGEST_RANGE:g} m to either"
+                " side, or 0 for 0.6 of the larger range",
+            )
         _refuse(
             self.samples_per_line % 2 == 1,
             f"samples_per_line = {self.samples_per_line} is odd, so the trace and the retrace"

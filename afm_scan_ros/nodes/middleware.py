@@ -196,7 +196,7 @@ def _lacks_memory(root: ET.Element, environment: Mapping[str, str]) -> Iterator[
         yield (
             "the default participant names no transport of type SHM in userTransports: name one"
             f" with segment_size of at least {SEGMENT} and healthy_check_timeout_ms of at most"
-            f" {CHECK:.0f}"
+            f" {CHECK:.0f}; or UDP alone, as {NETWORK} does"
         )
 
 

@@ -57,7 +57,9 @@ class Peers:
         if before is not None and before.state == FAILED:
             return  # it stays so: of two of one name the other goes on to say that it runs
         if before is not None and _falls_back(before, report):
-            report = evolve(before, state=FAILED, reason="restarted during the scan")
+            report = evolve(
+                before, state=FAILED, reason="restarted, or another scan began in this ROS domain"
+            )
         elif before is not None and report.next_sample == before.next_sample:
             report = evolve(report, advanced=before.advanced)
         if report.state == RUNNING and self._order[:1] == (report.node,) and not self._began:

@@ -71,6 +71,11 @@ def kept_text(name: str, step: growth.GrowthStep) -> str:
     return sentence(code, name=name, share=step.share, reached=step.reached)
 
 
+def beyond_text(name: str, reached: growth.Reached) -> str:
+    """State that a record went beyond a limit that it was to keep."""
+    return sentence("growth.beyond", name=name, reached=reached)
+
+
 def growth_row(name: str, planned: float, last: growth.Watched) -> Row:
     """Row of a record; ``planned`` is its planned amplitude in V."""
     x, y = last.responses["x"], last.responses["y"]

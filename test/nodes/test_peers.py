@@ -81,26 +81,26 @@ def test_silence_counts_from_when_one_listens() -> None:
 def test_a_node_that_starts_anew_has_failed(state: str) -> None:
     """Its heartbeats would else hold a scan up for ever that it knows nothing of."""
     made = peers(report("middle", state, next_sample=500), report("middle", READY, scan_id=""))
-    assert made.failure() == "middle failed: restarted during the scan"
+    assert made.failure() == "middle failed: restarted, or another scan began in this ROS domain"
     made.hear(report("middle", READY))
-    assert made.failure() == "middle failed: restarted during the scan"
+    assert made.failure() == "middle failed: restarted, or another scan began in this ROS domain"
 
 
 def test_progress_that_goes_back_is_another_node_s_of_the_same_name() -> None:
     """Started a second time, it may fail because it came late before it says anything else."""
     late = report("middle", FAILED, reason="samples 0 to 499 are missing")
     made = peers(report("middle", next_sample=500), late)
-    assert made.failure() == "middle failed: restarted during the scan"
+    assert made.failure() == "middle failed: restarted, or another scan began in this ROS domain"
 
 
 def test_a_failure_stands_whatever_another_of_the_same_name_goes_on_to_say() -> None:
     """The others look at it ten times a second; the other reports more often."""
     late = report("middle", FAILED, reason="samples 0 to 499 are missing")
     made = peers(report("middle", next_sample=500), late, report("middle", next_sample=600))
-    assert made.failure() == "middle failed: restarted during the scan"
+    assert made.failure() == "middle failed: restarted, or another scan began in this ROS domain"
     made.hear(late)
     made.hear(report("middle", DONE, next_sample=700))
-    assert made.failure() == "middle failed: restarted during the scan"
+    assert made.failure() == "middle failed: restarted, or another scan began in this ROS domain"
 
 
 def test_a_node_that_starts_anew_before_the_scan_is_welcome() -> None:

@@ -14,9 +14,11 @@ from afm_scan_ros.core.identification.drives.excitation import Plan
 from afm_scan_ros.core.identification.drives.growth import (
     FACTOR,
     FIRST,
+    GrowthStep,
     MeasuredResponse,
     MotionLimits,
     Watched,
+    beyond,
     grow,
     next_step,
     response,
@@ -170,3 +172,41 @@ def test_creep_is_how_far_a_hold_goes_on() -> None:
     time = np.arange(len(drive.x)) * drive.sample_period
     before, early, late = (moved.x[time > each][0] for each in (4.9, 5.15, 14.9))
     assert seen.creep == pytest.approx((late - before) / (early - before), rel=0.01)
+
+
+def test_exchanged_sensors_end_the_survey_which_is_small() -> None:
+    def drive(plan: Plan, _: object) -> tuple[Trace, Trace]:
+        given, moved = drive_through(plan, default_plant(), seed=1)
+        return given, evolve(moved, x=moved.y, y=moved.x)
+
+    record = proposed("resonance", Coverage())
+    with pytest.raises(ScanError, match=r"axis x moved .* not exchanged"):
+        list(grow(record, drive, LIMITS, Coverage()))
+
+
+@pytest.mark.parametrize("times", [30.0, 1.0 / 30.0, -1.0])
+def test_records_at_hand_of_another_scanner_end_the_second_trial(times: float) -> None:
+    def drive(plan: Plan, _: object) -> tuple[Trace, Trace]:
+        return drive_through(plan, default_plant(), seed=1)
+
+    known = evolve(KNOWN, gain=9e-6 * times)
+    seen = grow(proposed("hysteresis"), drive, LIMITS, known)
+    assert [next(seen).step.share for _ in range(2)] == [FIRST, FACTOR * FIRST]
+    with pytest.raises(ScanError, match="give this scanner's"):
+        next(seen)
+
+
+@given(st.floats(1.0, 10.0))
+def test_a_record_that_rings_more_is_foreseen_to_move_as_much_farther(times: float) -> None:
+    trial = MeasuredResponse(8e-6, 1e-6, 2e-6, 0.5e-6)
+    record = trial.ringing(times)
+    assert record.excitation == pytest.approx(times * trial.excitation)
+    assert record.travel - trial.travel == pytest.approx(2.0 * (times - 1.0) * trial.excitation)
+
+
+def test_a_record_beyond_its_limits_names_each() -> None:
+    seen = MeasuredResponse(1.1 * LIMITS.travel, 1e-6, 1.2 * LIMITS.excitation, 0.0)
+    calm = MeasuredResponse(0.9 * LIMITS.travel, 1e-6, 0.0, 0.0)
+    found = list(beyond(Watched(GrowthStep(0.5, whole=True), {"x": calm, "y": seen}), LIMITS))
+    assert [(each.axis, each.quantity) for each in found] == [("y", "travel"), ("y", "excitation")]
+    assert [each.expected / each.limit for each in found] == pytest.approx([1.1, 1.2])

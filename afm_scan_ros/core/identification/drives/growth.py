@@ -13,7 +13,7 @@ from operator import itemgetter
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import gt
-from scipy import fft
+from scipy import fft, signal
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, scaled
@@ -60,18 +60,24 @@ class MeasuredResponse:
     """What an axis did: its ``travel`` from peak to peak (m), and its slow ``gain`` (m/V).
 
     ``peak`` (m) is that of the fast displacement, ``steady`` (m) what the fast drive gives by the
-    slow gain.
+    slow gain. ``follows`` is the correlation of the slow displacement with the slow drive.
     """
 
     travel: float
     gain: float
     peak: float
     steady: float
+    follows: float = 1.0
 
     @property
     def excitation(self) -> float:
         """Peak of the fast displacement beyond its steady amplitude, m."""
         return max(0.0, self.peak - self.steady)
+
+    def ringing(self, times: float) -> "MeasuredResponse":
+        """Return the response to a drive that excites the resonance so many times as much."""
+        more = (times - 1.0) * self.excitation
+        return evolve(self, travel=self.travel + 2.0 * more, peak=self.peak + more)
 
 
 @frozen
@@ -112,14 +118,19 @@ def grow(
     """Drive the trial of a record by growing shares, and then the record; yield each step.
 
     ``have`` is what is known already. Without a resonance each step's own record shows it. A record
-    that lasts longer than its trial creeps further: the trial's travel leaves room for that. Raises
-    ScanError where a displacement does not grow with the drive.
+    that lasts longer than its trial creeps further, and may ring more: the trial's travel leaves
+    room for that. Raises ScanError where a displacement does not grow with the drive or follow it,
+    and where the gain is not of what is known already.
     """
-    if record.seconds > record.trial.duration:
+    longer = record.seconds > record.trial.duration
+    if longer:
         limits = evolve(limits, travel=limits.travel / have.creep)
     done: list[Watched] = []
+    foreseen: list[Watched] = []
     while not (done and done[-1].step.whole):
-        step = next_step(done, limits)
+        step = next_step(foreseen, limits)
+        if len(done) > 1:
+            _refuse_another(done[-1], have.gain)
         plan = scaled(record.plan if step.whole else record.trial, step.share)
         given, moved = drive(plan, step)
         pairs = {axis: (given.axis(axis), moved.axis(axis)) for axis in AXES}
@@ -129,6 +140,66 @@ def grow(
         }
         done.append(Watched(step, seen))
         yield done[-1]
+        if step.whole:
+            _refuse_exchanged(done[-1])
+        elif longer and have.resonance:
+            omega, share = 2.0 * np.pi * have.resonance, step.share
+            seen = {a: one.ringing(_more(record, a, omega, one, share)) for a, one in seen.items()}
+        foreseen.append(Watched(step, seen))
+
+
+def beyond(watched: Watched, limits: MotionLimits) -> Iterator[Reached]:
+    """Yield each limit that a step exceeded, with what was reached in place of what is expected."""
+    bounds = {"travel": limits.travel, "excitation": limits.excitation}
+    for (axis, seen), (quantity, limit) in product(watched.responses.items(), bounds.items()):
+        if (value := getattr(seen, quantity)) > limit:
+            yield Reached(axis, quantity, value, limit, watched.step.share)
+
+
+def _refuse_exchanged(watched: Watched) -> None:
+    for axis, seen in watched.responses.items():
+        if abs(seen.follows) < FOLLOWS:
+            raise ScanError(
+                f"axis {axis} moved {1e6 * seen.travel:.3g} µm, but not with its own drive"
+                f" (correlation {seen.follows:.2g}): see that drives and sensors of x and y are not"
+                " exchanged"
+            )
+
+
+def _refuse_another(watched: Watched, known: float | None) -> None:
+    """Refuse a scanner that is not that of the records at hand, by its gain (m/V)."""
+    for axis, seen in watched.responses.items():
+        if known and not FACTOR**-2 < seen.gain / known < FACTOR**2:
+            raise ScanError(
+                f"axis {axis} moves {1e6 * seen.gain:.3g} µm/V, but the records or the model at"
+                f" hand {1e6 * known:.3g}: give this scanner's"
+            )
+
+
+def _more(
+    record: ProposedRecord, axis: str, omega: float, seen: MeasuredResponse, share: float
+) -> float:
+    """Return how many times as much a record excites a resonance (rad/s) as its trial, 1 or more.
+
+    The damping is that with which a share of the trial rings as was seen.
+    """
+    wave, period = getattr(record.trial, axis), record.trial.sample_period
+    dampings = np.geomspace(1e-3, 1.0, 13)
+    rung = np.array([_rung(wave, period, omega, damping) for damping in dampings])
+    measured = seen.excitation / abs(seen.gain) / share if seen.gain else 0.0
+    nearest = int(np.abs(rung - measured).argmin())
+    if not rung[nearest]:
+        return 1.0
+    whole = _rung(getattr(record.plan, axis), record.plan.sample_period, omega, dampings[nearest])
+    return max(1.0, whole / float(rung[nearest]))
+
+
+def _rung(wave: Array, period: float, omega: float, damping: float) -> float:
+    """Peak (V) of what a resonance adds to a drive, (n,)."""
+    stage = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
+    numerator, denominator, _ = signal.cont2discrete(stage, period)
+    moved = signal.lfilter(np.ravel(numerator), denominator, wave - wave[0])
+    return float(np.abs(moved - (wave - wave[0])).max())
 
 
 def next_step(done: Sequence[Watched], limits: MotionLimits) -> GrowthStep:
@@ -212,12 +283,15 @@ def response(
     slow, fast = _split(displacement, sample_period, 0.5 * resonance)
     gain = float(slow_drive @ slow / (slow_drive @ slow_drive)) if np.any(slow_drive) else 0.0
     steady = abs(gain) * float(np.abs(fast_drive).max())
-    return MeasuredResponse(float(np.ptp(displacement)), gain, float(np.abs(fast).max()), steady)
+    size = float(np.linalg.norm(slow_drive) * np.linalg.norm(slow))
+    follows = float(slow_drive @ slow) / size if size else 1.0
+    peak = float(np.abs(fast).max())
+    return MeasuredResponse(float(np.ptp(displacement)), gain, peak, steady, follows)
 
 
-def _split(signal: Array, sample_period: float, frequency: float) -> tuple[Array, Array]:
+def _split(values: Array, sample_period: float, frequency: float) -> tuple[Array, Array]:
     """Parts of a signal (n,) below and above a frequency (Hz), without its mean."""
-    spectrum = fft.rfft(signal - signal.mean())
-    spectrum[fft.rfftfreq(signal.size, sample_period) >= frequency] = 0.0
-    slow = fft.irfft(spectrum, signal.size)
-    return slow, signal - signal.mean() - slow
+    spectrum = fft.rfft(values - values.mean())
+    spectrum[fft.rfftfreq(values.size, sample_period) >= frequency] = 0.0
+    slow = fft.irfft(spectrum, values.size)
+    return slow, values - values.mean() - slow

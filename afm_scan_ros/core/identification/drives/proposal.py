@@ -24,6 +24,7 @@ from afm_scan_ros.core.identification.drives.waveforms import raised
 from afm_scan_ros.core.identification.records.kinds import recognised
 from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.model import ScannerModel
+from afm_scan_ros.core.scan_spec import LARGEST_RANGE
 from afm_scan_ros.core.types import Array
 
 BRIEF = 100
@@ -42,7 +43,8 @@ class Coverage:
 
     ``resonance`` is the frequency (Hz) of the largest response to waves, ``gain`` m/V; ``fresh``
     marks a record that may be held out: of motion as scans are, or a second one of loops. ``creep``
-    is the displacement at the end of the hold over that at its beginning.
+    is the displacement at the end of the hold over that at its beginning, ``travel`` that of loops
+    from peak to peak, m.
     """
 
     hold: float = 0.0
@@ -51,6 +53,7 @@ class Coverage:
     gain: float | None = None
     fresh: bool = False
     creep: float = 1.0
+    travel: float = 0.0
 
 
 def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverage:
@@ -66,7 +69,7 @@ def coverage(drive: Array, displacement: Array, sample_period: float) -> Coverag
         return Coverage(resonance=response_peak(drive, displacement, sample_period))
     turns = np.unique(np.rint(drive[turning_points(drive)] / (APART * swing))) if swing else ()
     if len(turns) >= TURNS:
-        return Coverage(loops=swing, gain=gain)
+        return Coverage(loops=swing, gain=gain, travel=float(np.ptp(displacement)))
     return Coverage(fresh=swing > 0.0, gain=gain)
 
 
@@ -98,6 +101,7 @@ def combined(parts: Iterable[Coverage]) -> Coverage:
             part.gain if part.loops >= together.loops and part.gain else together.gain,
             together.fresh or part.fresh or min(together.loops, part.loops) > 0.0,
             max(together.creep, part.creep),
+            max(together.travel, part.travel),
         )
     return together
 
@@ -228,6 +232,11 @@ def propose(
     Without a hold no record of creep is asked for. Raises InputError where the range is beyond what
     the converter reaches, and for a hold that is too short to show creep.
     """
+    if scan_range > LARGEST_RANGE:
+        raise InputError(
+            f"a range of {1e6 * scan_range:.3g} µm is more than any piezoscanner's"
+            f" {1e6 * LARGEST_RANGE:g} µm: correct its unit"
+        )
     if hold is not None and hold < SHORTEST:
         raise InputError(f"a hold of {hold:g} s shows no creep: hold for {SHORTEST:g} s at least")
     converter = _needed(converter, scan_range, have)
