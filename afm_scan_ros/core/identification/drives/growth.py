@@ -167,13 +167,17 @@ def _refuse_exchanged(watched: Watched) -> None:
 
 
 def _refuse_another(watched: Watched, known: float | None) -> None:
-    """Refuse a scanner that is not that of the records at hand, by its gain (m/V)."""
-    for axis, seen in watched.responses.items():
-        if known and not FACTOR**-2 < seen.gain / known < FACTOR**2:
-            raise ScanError(
-                f"axis {axis} moves {1e6 * seen.gain:.3g} µm/V, but the records or the model at"
-                f" hand {1e6 * known:.3g}: give this scanner's"
-            )
+    """Refuse a scanner that is not that of the records at hand, by its gain (m/V).
+
+    What is known is the gain of one axis, of which another may differ.
+    """
+    gains = {axis: seen.gain for axis, seen in watched.responses.items()}
+    if known and not any(FACTOR**-2 < abs(one / known) < FACTOR**2 for one in gains.values()):
+        moves = " and ".join(f"{axis} {1e6 * one:.3g}" for axis, one in gains.items())
+        raise ScanError(
+            f"the scanner moves {moves} µm/V, but the records or the model at hand"
+            f" {1e6 * known:.3g}: give this scanner's"
+        )
 
 
 def _more(
