@@ -8,6 +8,7 @@ import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan
@@ -228,3 +229,17 @@ def test_an_axis_may_have_another_gain_than_the_one_that_is_known(
 
     limits = MotionLimits(1.0, 1.0)
     assert list(grow(RECORD, drive, limits, Coverage(gain=1e-6)))[-1].step.share == 1.0
+
+
+@pytest.mark.parametrize("corner", [0.3, 3.0, 30.0])
+def test_a_stage_without_a_resonance_is_calibrated(corner: float) -> None:
+    """Its largest response is to the slowest wave, below which there is no drive."""
+
+    def drive(plan: Plan, _: object) -> tuple[Trace, Trace]:
+        given_ = Trace(0, plan.sample_period, plan.x, plan.y)
+        part = 1.0 - np.exp(-2.0 * np.pi * corner * plan.sample_period)
+        x, y = (1e-6 * lfilter([part], [1.0, part - 1.0], wave) for wave in (plan.x, plan.y))
+        return given_, evolve(given_, x=x, y=y)
+
+    record = proposed("resonance", Coverage())
+    assert list(grow(record, drive, LIMITS, Coverage()))[-1].step.share == 1.0

@@ -60,7 +60,8 @@ class MeasuredResponse:
     """What an axis did: its ``travel`` from peak to peak (m), and its slow ``gain`` (m/V).
 
     ``peak`` (m) is that of the fast displacement, ``steady`` (m) what the fast drive gives by the
-    slow gain. ``follows`` is the correlation of the slow displacement with the slow drive.
+    slow gain. ``follows`` is the correlation of the slow displacement with the slow drive,
+    1 where that is small.
     """
 
     travel: float
@@ -287,8 +288,9 @@ def response(
     slow, fast = _split(displacement, sample_period, 0.5 * resonance)
     gain = float(slow_drive @ slow / (slow_drive @ slow_drive)) if np.any(slow_drive) else 0.0
     steady = abs(gain) * float(np.abs(fast_drive).max())
-    size = float(np.linalg.norm(slow_drive) * np.linalg.norm(slow))
-    follows = float(slow_drive @ slow) / size if size else 1.0
+    driven, size = np.linalg.norm(slow_drive), np.linalg.norm(slow_drive) * np.linalg.norm(slow)
+    slowly = driven > FOLLOWS * np.linalg.norm(fast_drive) and size > 0.0
+    follows = float(slow_drive @ slow / size) if slowly else 1.0
     peak = float(np.abs(fast).max())
     return MeasuredResponse(float(np.ptp(displacement)), gain, peak, steady, follows)
 
