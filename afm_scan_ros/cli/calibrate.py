@@ -157,10 +157,9 @@ def calibrate(  # noqa: PLR0913, PLR0917 - click hands over one parameter an opt
 
 
 def _identified(bags: Sequence[Path]) -> str:
-    """Return the command that identifies a model from records, of which one may be held out."""
-    held_out = {bag: "--validation " for bag in bags if bag.name == "validation"}
-    given = " ".join(f"{held_out.get(bag, '')}{bag}" for bag in bags)
-    return f"afm-scan identify {given} --out model.yaml"
+    """Return the command that identifies a model from records; that of validation is held out."""
+    words = (f"--validation {bag}" if bag.name == "validation" else str(bag) for bag in bags)
+    return f"afm-scan identify {' '.join(words)} --out model.yaml"
 
 
 def _export(

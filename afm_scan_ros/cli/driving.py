@@ -239,9 +239,9 @@ class PlannedCalibration:
 
     def _next(self, have: proposal.Coverage, done: set[str]) -> proposal.ProposedRecord | None:
         proposed = proposal.propose(self.converter, self.hold, self.scan_range, have)
-        far = have.travel >= min(self.scan_range, 0.75 * self.motion.travel)
-        known = {*done, *(["hysteresis"] if far else [])}
-        lacking = [record for record in proposed if record.plan.name not in known]
+        if have.travel >= self.motion.nearly * self.motion.travel:
+            done = {*done, "hysteresis"}
+        lacking = [record for record in proposed if record.plan.name not in done]
         return min(lacking, key=lambda record: ORDER.index(record.identifies), default=None)
 
     def _grow(self, record: proposal.ProposedRecord, have: proposal.Coverage) -> None:

@@ -17,6 +17,7 @@ from afm_scan_ros.cli.scanner import (
     amplifier_of,
     choose,
     exchange_of,
+    limit_parameters,
     pace_of,
     scan_by_files,
     scanner_options,
@@ -119,16 +120,9 @@ def _own(
 ) -> dict[str, orders.Parameters]:
     """Parameters of the compensator and the monitor, before those of their files."""
     learned = {"learned_file": str(files.learned)} if files.learned else {}
-    own = {**learned, **online, **_limits(scanner)}
+    own = {**learned, **online, **limit_parameters(scanner.limits)}
     tracked = {name: online[name] for name, each in ONLINE.items() if each.tracker}
     return {orders.COMPENSATOR: own, orders.MONITOR: tracked}
-
-
-def _limits(scanner: ScannerChoice) -> orders.Parameters:
-    """Limits of the scanner, for the compensator to refuse a scan by before it moves."""
-    if (limits := scanner.limits) is None:
-        return {}
-    return {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
 
 
 def drive_limits_of(scanner: str, plant: Path) -> DriveLimits:

@@ -123,8 +123,7 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
         return _external()
     if scanner == SIM:
         limits = load_plant(plant).amplifier.limits
-        voltage, slew = limits.voltage, limits.slew
-        own = {"plant_file": str(plant), "voltage_limit_v": voltage, "slew_limit_v_per_s": slew}
+        own = {"plant_file": str(plant), **limit_parameters(limits)}
         return ScannerChoice(SIM_NODE, own, limits, knows_true=True)
     driver, file = driver_and_file(scanner)
     settings = load_settings(driver, file).settings
@@ -134,6 +133,13 @@ def choose(scanner: str, plant: Path = PLANT) -> ScannerChoice:
     }
     of_driver = {"driver": driver, "settings_file": str(file)}
     return ScannerChoice(DRIVER_NODE, of_driver, settings.amplifier.limits, source=source)
+
+
+def limit_parameters(limits: DriveLimits | None) -> Mapping[str, object]:
+    """Parameters of a node by the limits of the scanner's drive; none where they are not known."""
+    if limits is None:
+        return {}
+    return {"voltage_limit_v": limits.voltage, "slew_limit_v_per_s": limits.slew}
 
 
 def _external() -> ScannerChoice:

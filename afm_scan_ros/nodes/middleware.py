@@ -123,14 +123,13 @@ def _prepare_fast_dds(environment: MutableMapping[str, str], *, viewing: bool) -
 
 
 def _profile(environment: MutableMapping[str, str], *, viewing: bool) -> str:
-    """Return the name of our profile for the discovery that ROS is asked for.
+    """Return the name of our profile, and set the range of discovery that goes with it.
 
-    ROS adds shared memory for LOCALHOST whatever a profile says, so that the profile takes over
-    what that range means, unless it is asked for in a way that a profile cannot.
+    ROS adds shared memory for LOCALHOST whatever a profile says. A profile does what that range
+    means in its place, unless peers are given or ROS_LOCALHOST_ONLY asks for it.
     """
-    local = environment.get(RANGE) == "LOCALHOST" or environment.get(PROFILES, "").endswith(
-        COMPUTER
-    )
+    ours = environment.get(PROFILES, "").endswith(COMPUTER)
+    local = ours or environment.get(RANGE) == "LOCALHOST"
     by_ros = environment.get("ROS_LOCALHOST_ONLY") == "1" or (local and environment.get(PEERS))
     if by_ros or not (viewing or sockets_hold(in_flight())):
         return SHARED

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -220,6 +221,18 @@ def test_profiles_without_shared_memory_give_what_a_scan_needs(name: str) -> Non
     assert lacking(file, {RANGE: "SYSTEM_DEFAULT"}) == []
     sizes = [int(size.text or 0) for size in tree.iterfind(".//{*}receiveBufferSize")]
     assert sizes == [in_flight()]
+
+
+def test_all_profiles_let_a_writer_keep_and_repeat_the_same() -> None:
+    """Fast DDS reads one file, so that each has to state it all."""
+    files = [OURS, *(OURS.with_name(name) for name in UDP_ALONE)]
+    trees = [ET.parse(file) for file in files]  # noqa: S314 - our own files
+    for path in (".//{*}data_writer", ".//{*}leaseAnnouncement"):
+        stated = [
+            [(each.tag, (each.text or "").strip()) for each in element.iter()]
+            for element in map(itemgetter(0), (tree.findall(path) for tree in trees))
+        ]
+        assert stated[0] == stated[1] == stated[2]
 
 
 def test_a_users_profile_stays_and_is_checked(tmp_path: Path) -> None:

@@ -200,14 +200,6 @@ def test_records_at_hand_of_another_scanner_end_the_second_trial(times: float) -
         next(seen)
 
 
-@given(st.floats(1.0, 10.0))
-def test_a_record_that_rings_more_is_foreseen_to_move_as_much_farther(times: float) -> None:
-    trial = MeasuredResponse(8e-6, 1e-6, 2e-6, 0.5e-6)
-    record = trial.ringing(times)
-    assert record.excitation == pytest.approx(times * trial.excitation)
-    assert record.travel - trial.travel == pytest.approx(2.0 * (times - 1.0) * trial.excitation)
-
-
 def test_a_record_beyond_its_limits_names_each() -> None:
     seen = MeasuredResponse(1.1 * LIMITS.travel, 1e-6, 1.2 * LIMITS.excitation, 0.0)
     calm = MeasuredResponse(0.9 * LIMITS.travel, 1e-6, 0.0, 0.0)

@@ -13,7 +13,7 @@ from operator import itemgetter
 import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import gt
-from scipy import fft, signal
+from scipy import fft
 
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.identification.drives.excitation import Plan, scaled
@@ -37,11 +37,19 @@ FOLLOWS = 0.25
 class MotionLimits:
     """Largest ``travel``, displacement from peak to peak, and ``excitation`` of the resonance, m.
 
-    The excitation is the peak of the fast displacement beyond its steady amplitude.
+    The excitation is the peak of the fast displacement beyond its steady amplitude. A record that
+    has ``nearly`` the travel, as a share of it, is as large as the limit lets it be: what is
+    extrapolated from trials stays below.
     """
 
     travel: float = field(validator=gt(0.0))
     excitation: float = field(validator=gt(0.0))
+    nearly: float = 0.8
+
+    @property
+    def bounds(self) -> Sequence[tuple[str, float]]:
+        """Each quantity of a response that is limited, and its limit, m."""
+        return ("travel", self.travel), ("excitation", self.excitation)
 
     @classmethod
     def of_range(
@@ -74,11 +82,6 @@ class MeasuredResponse:
     def excitation(self) -> float:
         """Peak of the fast displacement beyond its steady amplitude, m."""
         return max(0.0, self.peak - self.steady)
-
-    def ringing(self, times: float) -> "MeasuredResponse":
-        """Return the response to a drive that excites the resonance so many times as much."""
-        more = (times - 1.0) * self.excitation
-        return evolve(self, travel=self.travel + 2.0 * more, peak=self.peak + more)
 
 
 @frozen
@@ -119,17 +122,15 @@ def grow(
     """Drive the trial of a record by growing shares, and then the record; yield each step.
 
     ``have`` is what is known already. Without a resonance each step's own record shows it. A record
-    that lasts longer than its trial creeps further, and may ring more: the trial's travel leaves
-    room for that. Raises ScanError where a displacement does not grow with the drive or follow it,
-    and where the gain is not of what is known already.
+    that lasts longer than its trial creeps further: the trial's travel leaves room for that. Raises
+    ScanError where a displacement does not grow with the drive or follow it, and where no axis has
+    the gain of what is known already.
     """
-    longer = record.seconds > record.trial.duration
-    if longer:
+    if record.seconds > record.trial.duration:
         limits = evolve(limits, travel=limits.travel / have.creep)
     done: list[Watched] = []
-    foreseen: list[Watched] = []
     while not (done and done[-1].step.whole):
-        step = next_step(foreseen, limits)
+        step = next_step(done, limits)
         if len(done) > 1:
             _refuse_another(done[-1], have.gain)
         plan = scaled(record.plan if step.whole else record.trial, step.share)
@@ -141,18 +142,12 @@ def grow(
         }
         done.append(Watched(step, seen))
         yield done[-1]
-        if step.whole:
-            _refuse_exchanged(done[-1])
-        elif longer and have.resonance:
-            omega, share = 2.0 * np.pi * have.resonance, step.share
-            seen = {a: one.ringing(_more(record, a, omega, one, share)) for a, one in seen.items()}
-        foreseen.append(Watched(step, seen))
+    _refuse_exchanged(done[-1])
 
 
 def beyond(watched: Watched, limits: MotionLimits) -> Iterator[Reached]:
     """Yield each limit that a step exceeded, with what was reached in place of what is expected."""
-    bounds = {"travel": limits.travel, "excitation": limits.excitation}
-    for (axis, seen), (quantity, limit) in product(watched.responses.items(), bounds.items()):
+    for (axis, seen), (quantity, limit) in product(watched.responses.items(), limits.bounds):
         if (value := getattr(seen, quantity)) > limit:
             yield Reached(axis, quantity, value, limit, watched.step.share)
 
@@ -181,32 +176,6 @@ def _refuse_another(watched: Watched, known: float | None) -> None:
         )
 
 
-def _more(
-    record: ProposedRecord, axis: str, omega: float, seen: MeasuredResponse, share: float
-) -> float:
-    """Return how many times as much a record excites a resonance (rad/s) as its trial, 1 or more.
-
-    The damping is that with which a share of the trial rings as was seen.
-    """
-    wave, period = getattr(record.trial, axis), record.trial.sample_period
-    dampings = np.geomspace(1e-3, 1.0, 13)
-    rung = np.array([_rung(wave, period, omega, damping) for damping in dampings])
-    measured = seen.excitation / abs(seen.gain) / share if seen.gain else 0.0
-    nearest = int(np.abs(rung - measured).argmin())
-    if not rung[nearest]:
-        return 1.0
-    whole = _rung(getattr(record.plan, axis), record.plan.sample_period, omega, dampings[nearest])
-    return max(1.0, whole / float(rung[nearest]))
-
-
-def _rung(wave: Array, period: float, omega: float, damping: float) -> float:
-    """Peak (V) of what a resonance adds to a drive, (n,)."""
-    stage = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
-    numerator, denominator, _ = signal.cont2discrete(stage, period)
-    moved = signal.lfilter(np.ravel(numerator), denominator, wave - wave[0])
-    return float(np.abs(moved - (wave - wave[0])).max())
-
-
 def next_step(done: Sequence[Watched], limits: MotionLimits) -> GrowthStep:
     """Return what to drive after these steps, all trials of one record.
 
@@ -217,16 +186,15 @@ def next_step(done: Sequence[Watched], limits: MotionLimits) -> GrowthStep:
     for axis in AXES:
         _refuse_unmoved(axis, done)
     wanted = min(1.0, FACTOR * done[-1].step.share)
-    bounds = {"travel": limits.travel, "excitation": limits.excitation}
-    beyond = []
-    for axis, (quantity, limit) in product(AXES, bounds.items()):
+    exceeded = []
+    for axis, (quantity, limit) in product(AXES, limits.bounds):
         trend = Trend.of(done, axis, quantity)
         if (expected := trend.at(wanted)) > limit:
             reached = Reached(axis, quantity, expected, limit, wanted)
-            beyond.append((trend.share_at(limit), reached))
-    if not beyond:
+            exceeded.append((trend.share_at(limit), reached))
+    if not exceeded:
         return GrowthStep(wanted, whole=wanted == 1.0)
-    share, reached = min(beyond, key=itemgetter(0))
+    share, reached = min(exceeded, key=itemgetter(0))
     return GrowthStep(share, whole=True, reached=reached)
 
 
