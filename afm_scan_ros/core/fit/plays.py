@@ -9,6 +9,8 @@ correction that lets the density vary along the other axis of the Preisach plane
 
 with the widths Δ_r of the grid of thresholds over the half range, the density d_r, and quadratic
 B-splines b_j of the play's position, whose coefficients c_j(r) are linear between a few thresholds.
+T_r is zero in the middle of the range, or where a play stays that the range cannot push both ways,
+and the middle is added to T_0, so that P(u) lies about u in any range.
 Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.3 and 2.4.
 """
 
@@ -91,6 +93,20 @@ class Plays:
         """Knots of the B-splines b_j, V."""
         cells = self.settings.correction_cells
         return self.lower + 2.0 * self.half / cells * np.arange(-2.0, cells + 3.0)
+
+    @cached_property
+    def origins(self) -> Array:
+        """Positions of plays (V) at which T_r is zero, shape (plays,)."""
+        middle = 0.5 * (self.lower + self.upper)
+        return np.where(self.thresholds > self.half, self.settled, middle)
+
+    @cached_property
+    def risen(self) -> Array:
+        """Rises of the B-splines at the origins, V, (plays, splines)."""
+        places = (self.origins - self.lower) / (self.positions[1] - self.positions[0])
+        cells = np.clip(places.astype(int), 0, len(self.positions) - 2)
+        before, after = self.rises[:, cells], self.rises[:, cells + 1]
+        return np.asarray((before + (places - cells) * (after - before)).T)
 
     @cached_property
     def rises(self) -> Array:
@@ -258,8 +274,11 @@ class Plays:
     def tables(self, theta: Array) -> Array:
         """T_r at the positions, shape (plays, table)."""
         density, correction = self.weights(theta)
-        along = np.outer(density, self.positions) + correction @ self.rises
-        return np.asarray(self.widths[:, np.newaxis] * along)
+        along = density[:, np.newaxis] * (self.positions - self.origins[:, np.newaxis])
+        along += correction @ self.rises - np.sum(correction * self.risen, axis=1)[:, np.newaxis]
+        along *= self.widths[:, np.newaxis]
+        along[0] += self.origins[0]
+        return np.asarray(along)
 
     def output(self, theta: Array, drive: Array, start: Array) -> Array:
         """P(u) in V for a drive u (V), both (n,), after plays (V) at the ``start``, (plays,)."""
@@ -286,14 +305,14 @@ class Plays:
         """
         result = np.empty((len(plays), sum(self.parts.values())), np.float32)
         count = len(self.thresholds)
-        result[:, :count] = plays * self.widths
+        result[:, :count] = (plays - self.origins) * self.widths
         place = np.cumsum(self.reached).reshape(self.reached.shape) - 1
         place[~self.reached] = -1
         _correct(
             result[:, count:],
             (plays - self.lower) * (len(self.positions) - 1) / (self.upper - self.lower),
             0.5 * variances,
-            (self.rises.T.copy(), self._bent.T.copy()),
+            (self.rises.T.copy(), self._bent.T.copy(), self.risen),
             self.widths[:, np.newaxis] * self.blend,
             place,
         )
@@ -380,16 +399,17 @@ def _correct(
     result: NDArray[np.float32],
     cells: Array,
     variances: Array,
-    tables: tuple[Array, Array],
+    tables: tuple[Array, Array, Array],
     mixing: Array,
     place: NDArray[np.intp],
 ) -> None:
     """Derivatives by the correction, whose coefficients have a ``place``, (coarse, splines), or -1.
 
     ``cells`` are plays in cells of the ``tables`` of the rises and of their second derivatives,
-    (table, splines); ``mixing`` is the share of each coarse threshold, (plays, coarse).
+    (table, splines), of which the last holds the rises at the origins, (plays, splines); ``mixing``
+    is the share of each coarse threshold, (plays, coarse).
     """
-    rises, bends = tables
+    rises, bends, risen = tables
     last = rises.shape[0] - 2
     for k in range(cells.shape[0]):
         total = np.zeros(result.shape[1])
@@ -403,6 +423,7 @@ def _correct(
                 for j in range(rises.shape[1]):
                     if place[c, j] >= 0:
                         value = rises[cell, j] + part * (rises[cell + 1, j] - rises[cell, j])
+                        value -= risen[i, j]
                         value += half * (
                             bends[cell, j] + part * (bends[cell + 1, j] - bends[cell, j])
                         )

@@ -56,6 +56,25 @@ def test_each_play_moves_as_it_would_alone(seed: int, spread: float) -> None:
     np.testing.assert_allclose(bank.output(theta, path, start), expected, atol=1e-9)
 
 
+@given(seed=st.integers(0, 10_000), low=st.floats(-10.0, 10.0), swing=st.floats(1.0, 10.0))
+@settings(max_examples=20, deadline=None)
+def test_plays_in_the_middle_put_out_the_middle_of_any_range(
+    seed: int, low: float, swing: float
+) -> None:
+    """So the map behind them bends where records are, also those of a drive of one sign."""
+    rng, bank = np.random.default_rng(seed), PlayBank(low, low + swing)
+    middle = low + 0.5 * swing
+    theta = rng.standard_normal(sum(bank.parts.values()))
+    still = np.full(2, middle)
+    np.testing.assert_allclose(bank.output(theta, still, bank.origins), middle, atol=1e-9)
+    (columns,) = bank.pieces(theta, still, np.array([0, 2]), bank.origins)
+    np.testing.assert_allclose(columns, 0.0, atol=1e-6)
+    away = low + swing * rng.random(200)
+    (slopes,) = bank.pieces(theta, away, np.arange(201), bank.origins)
+    expected = middle + slopes.astype(float) @ theta
+    np.testing.assert_allclose(bank.output(theta, away, bank.origins), expected, atol=2e-3 * swing)
+
+
 @pytest.mark.parametrize(("low", "high"), [(0.0, 5.0), (-1.0, 4.0), (-3.0, 3.0)])
 def test_a_model_rests_at_zero_and_moves_as_the_plays_do(low: float, high: float) -> None:
     """Also where plays move once from rest and never again: what they moved by is an offset."""
