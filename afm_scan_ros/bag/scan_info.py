@@ -1,5 +1,6 @@
 """What a bag states of its scan, and its blocks of samples, verified."""
 
+from contextlib import suppress
 from math import inf, isclose, isfinite
 from typing import Any
 
@@ -100,12 +101,22 @@ def encode_info(info: ScanInfo) -> bytes:
 
 
 def decode_info(cdr: bytes) -> ScanInfo:
-    """Read a ``ScanInfo`` from its CDR; raises InputError where it is not one."""
+    """Read a ``ScanInfo`` from its CDR, also one that ends before the centre, which is 0 then.
+
+    Raises InputError where it is not one.
+    """
+    centred = cdr + bytes(-(len(cdr) - typestore.ENCODING_SIZE) % 8 + 2 * 8)
     try:
-        message = typestore.decode(TYPE, cdr)
+        message = _decoded(cdr) or typestore.decode(TYPE, centred)
     except ValueError as error:
         raise InputError(f"scan_info: {error}") from error
     return info_from_message(message)
+
+
+def _decoded(cdr: bytes) -> typestore.Message | None:
+    with suppress(ValueError):
+        return typestore.decode(TYPE, cdr)
+    return None
 
 
 DISPLACEMENT = f"{typestore.PACKAGE}/DisplacementBlock"

@@ -64,7 +64,7 @@ def stamp_of(message: Message) -> int:
 
 
 _LITTLE_ENDIAN = b"\x00\x01"
-_ENCODING_SIZE = 4
+ENCODING_SIZE = 4
 _COUNT_SIZE = 4
 
 
@@ -109,7 +109,7 @@ class _Cursor:
 
     place: int = 0
     fields: list[tuple[str, Any, int]] = field(factory=list)
-    shaping: list[NDArray[np.intp]] = field(factory=lambda: [np.arange(_ENCODING_SIZE)])
+    shaping: list[NDArray[np.intp]] = field(factory=lambda: [np.arange(ENCODING_SIZE)])
 
     def pass_message(self, type_name: str, message: Message, prefix: str) -> None:
         definitions: list[Any] = typestore().fielddefs[type_name][1]
@@ -123,7 +123,7 @@ class _Cursor:
             elif of[0] == "string":
                 self._pass_shaping(_COUNT_SIZE, _COUNT_SIZE)
                 self._pass_field(prefix + name, np.dtype(np.uint8), (len(value.encode()),))
-                self.shaping.append(np.arange(self.fields[-1][-1], _ENCODING_SIZE + self.place))
+                self.shaping.append(np.arange(self.fields[-1][-1], ENCODING_SIZE + self.place))
                 self._pass_shaping(1, 1)
             else:
                 self._pass_field(prefix + name, np.dtype(of[0]), ())
@@ -140,7 +140,7 @@ class _Cursor:
 
     def _aligned(self, size: int) -> int:
         self.place += -self.place % size
-        return _ENCODING_SIZE + self.place
+        return ENCODING_SIZE + self.place
 
 
 IMAGE = "sensor_msgs/msg/Image"

@@ -43,8 +43,8 @@ def most_pixels(spec: ScanSpec) -> int:
     return int(0.5 * spec.samples_per_line * (1.0 - 2.0 * spec.overscan)) - 1
 
 
-def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
-    """Return what a scan images of its lines from ``left`` (m) on, all but the overscan.
+def frame_of(spec: ScanSpec, pixels: int) -> Frame:
+    """Return what a scan images of its lines, all but the overscan.
 
     Raises InputError for a pattern without lines, and for more pixels than a trace has samples.
     """
@@ -57,9 +57,8 @@ def frame_of(spec: ScanSpec, pixels: int, left: float | None = None) -> Frame:
         raise InputError(
             f"pixels = {pixels}: a trace has {most + 1} samples to image, give fewer pixels"
         )
-    lowest = -0.5 * spec.range_x if left is None else left
-    margin = spec.overscan * spec.range_x
-    return Frame(lowest + margin, lowest + spec.range_x - margin, pixels)
+    half = (0.5 - spec.overscan) * spec.range_x
+    return Frame(spec.centre_x - half, spec.centre_x + half, pixels)
 
 
 def pixel_means(position: Array, values: Array, frame: Frame) -> Array:

@@ -187,7 +187,7 @@ def _advice(spec: ScanSpec, ranges: Ranges) -> str:
     if not ranges:
         return (
             "no range is possible, for the preparation alone goes beyond: give preparation_lower_um"
-            " and preparation_upper_um nearer to zero"
+            " and preparation_upper_um nearer to zero, or centre_x_um and centre_y_um within reach"
         )
     largest = ", ".join(f"{axis} {_rounded_down(1e6 * each):g} µm" for axis, each in ranges.items())
     alone = ranges["x"] >= spec.range_x and ranges["y"] < spec.range_y

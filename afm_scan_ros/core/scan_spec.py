@@ -14,7 +14,8 @@ PATTERNS = ("raster", "sinusoidal", "spiral", "lissajous")
 PREPARATIONS = ("depolarise", "saturate", "none")
 SMALLEST_RANGE, LARGEST_RANGE = 1e-9, 1e-3
 PLAUSIBLE = (ge(SMALLEST_RANGE), le(LARGEST_RANGE))
-"""Ranges, m, that a piezoscanner can have: what lies outside was meant in another unit."""
+REACHED = (ge(-LARGEST_RANGE), le(LARGEST_RANGE))
+"""Ranges and displacements, m, of a piezoscanner: what lies outside was meant in another unit."""
 MOST_PER_LINE = 10**7
 """Samples in a line; one is held in memory whole."""
 FASTEST = 1e7
@@ -97,10 +98,10 @@ class ScanSpec:
         "depolarise", "How the scanner's memory is set before the scan", in_(PREPARATIONS)
     )
     preparation_lower: float = parameter(
-        0.0, "Lowest displacement of the preparation; 0: 0.6 of the larger range down", suffix="_um"
+        0.0, "Lowest of the preparation, from the centre; 0: 0.6 of the larger range", suffix="_um"
     )
     preparation_upper: float = parameter(
-        0.0, "Highest displacement of the preparation; 0: 0.6 of the larger range up", suffix="_um"
+        0.0, "Highest of the preparation, from the centre; 0: 0.6 of the larger range", suffix="_um"
     )
     preparation_rate: float = parameter(
         10.0, "Oscillations of the preparation a second", gt(0.0), suffix="_hz"
@@ -110,11 +111,13 @@ class ScanSpec:
         0.1, "Time from rest at zero to the first line", gt(0.0), suffix="_s"
     )
     settle: float = parameter(0.1, "Time from the last line to rest at zero", gt(0.0), suffix="_s")
+    centre_x: float = parameter(0.0, "Displacement in the scan's middle, x", *REACHED, suffix="_um")
+    centre_y: float = parameter(0.0, "Displacement in the scan's middle, y", *REACHED, suffix="_um")
 
     def __attrs_post_init__(self) -> None:
         for name, end in self._preparation_of_range().items():
             stated = getattr(self, name)
-            if stated == 0.0:
+            if stated in (0.0, end):
                 object.__setattr__(self, name, end)
                 continue
             _refuse(

@@ -4,7 +4,8 @@ The preparation is an oscillation that sets the hysteresis state before the line
 defined for every sample number, before its first line and after its last one too; the approach and
 the settling are that continuation under an envelope that rises from 0 to 1 and falls back. So they
 join without a jump in position, nor in velocity where the pattern itself has none, and never leave
-the scan's range.
+the scan's range. The scan's centre is added to all of them: it is approached in the first cycle of
+the preparation, or where there is none with the pattern, and left in the settling.
 """
 
 from collections.abc import Callable, Mapping
@@ -177,12 +178,17 @@ def settle_samples(spec: ScanSpec) -> int:
 
 
 def preparation(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
-    """Displacement in m, the same along both axes, at sample numbers from the scan's start."""
-    cycles = spec.preparation_cycles * (samples / len(phases(spec).preparation))
+    """Displacement in m from the centre, the same along both axes, from the scan's start on."""
+    cycles = _prepared_cycles(spec, samples)
     if spec.preparation == "saturate":
         # from zero to the upper bound and back, once a cycle
         return np.asarray(spec.preparation_upper * 0.5 * (1.0 - np.cos(2.0 * np.pi * cycles)))
     return _decaying_oscillation(spec, cycles)
+
+
+def _prepared_cycles(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
+    """Cycles of the preparation that are over at sample numbers from the scan's start."""
+    return np.asarray(spec.preparation_cycles * (samples / len(phases(spec).preparation)))
 
 
 def _decaying_oscillation(spec: ScanSpec, cycles: Array) -> Array:
@@ -284,6 +290,10 @@ def _displacement(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Ar
         pattern_x, pattern_y = PATTERN[spec.pattern](spec, numbers)
         envelope = _envelope(spec, numbers)
         x[early:over], y[early:over] = envelope * pattern_x, envelope * pattern_y
+    if spec.centre_x != 0.0 or spec.centre_y != 0.0:
+        held = _held(spec, samples[:over])
+        x[:over] += spec.centre_x * held
+        y[:over] += spec.centre_y * held
     return x, y
 
 
@@ -294,6 +304,17 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
         return 1.0
     rise = smooth_step(1.0 + samples / len(phases(spec).approach))
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))
+
+
+def _held(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
+    """Share of the centre that is held at sample numbers from the scan's start."""
+    where = phases(spec)
+    if spec.preparation == "none":
+        rise = (samples - where.approach.start) / len(where.approach)
+    else:
+        rise = _prepared_cycles(spec, samples)
+    fall = smooth_step((samples - where.lines.stop) / settle_samples(spec))
+    return np.asarray(smooth_step(rise) * (1.0 - fall))
 
 
 def trajectory(spec: ScanSpec) -> Array:

@@ -271,8 +271,10 @@ def image_picture(name: str, images: Images, how: str) -> Picture:
 
     ``how`` says how it was scanned, as "at 30 Hz with 64 lines".
     """
-    half = 0.5 * MICRO * images.spec.range_x, 0.5 * MICRO * images.spec.range_y
-    span = -half[0], half[0], -half[1], half[1]
+    spec = images.spec
+    ends_of = ((spec.centre_x, spec.range_x), (spec.centre_y, spec.range_y))
+    x0, x1, y0, y1 = (MICRO * (c + way * w) for c, w in ends_of for way in (-0.5, 0.5))
+    span = x0, x1, y0, y1
     wrong = [NANO * (image - images.ideal) for image in images.imaged]
     ends = float(NANO * images.ideal.min()), float(NANO * images.ideal.max())
     largest = float(np.abs(wrong).max())

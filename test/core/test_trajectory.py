@@ -114,6 +114,25 @@ def test_it_never_leaves_the_range_nor_the_preparation(spec: ScanSpec) -> None:
         assert np.all(values[:prepared] <= spec.preparation_upper)
 
 
+@given(specs(), st.floats(-1e-4, 1e-4), st.floats(-1e-4, 1e-4), st.data())
+@settings(deadline=None)
+def test_a_centre_moves_the_whole_scan(
+    spec: ScanSpec, x: float, y: float, data: st.DataObject
+) -> None:
+    """It is held on all lines, approached before and left after them, and never passed."""
+    about, trace, where = whole(spec), whole(evolve(spec, centre_x=x, centre_y=y)), phases(spec)
+    cut = data.draw(st.integers(0, where.total))
+    later = desired(evolve(spec, centre_x=x, centre_y=y), cut, where.total - cut)
+    for axis, centre in (("x", x), ("y", y)):
+        assert np.array_equal(trace.axis(axis)[cut:], later.axis(axis))
+        held = trace.axis(axis) - about.axis(axis)
+        assert held[[0, -1]].tolist() == [0.0, 0.0]
+        assert on_lines(spec, held) == pytest.approx(centre, rel=1e-9, abs=1e-18)
+        rising = np.diff(held * np.sign(centre))
+        assert np.all(rising[: where.lines.start] >= -1e-18)
+        assert np.all(rising[where.lines.start :] <= 1e-18)
+
+
 def fastest_x(spec: ScanSpec) -> float:
     """Greatest speed of x on lines, approach and settling, m/s, with the envelope's 15/8."""
     half_period = 0.5 / spec.line_rate

@@ -37,6 +37,7 @@ def scaled_record(record: Record, scale: Scale) -> Record:
     spec = record.scan
     assert spec is not None
     lengths = ("range_x", "range_y", "preparation_lower", "preparation_upper")
+    lengths += ("centre_x", "centre_y")
     times = ("approach", "settle", "y_step")
     rates = ("line_rate", "preparation_rate")
     changed = {name: scale.length * getattr(spec, name) for name in lengths}

@@ -245,7 +245,7 @@ def _channel(spec: ScanSpec, frame: Frame, name: str, values: Array, way: str) -
         step * len(values),
         way,
         left=frame.left,
-        bottom=-0.5 * (spec.range_y + step),
+        bottom=spec.centre_y - 0.5 * (spec.range_y + step),
     )
 
 

@@ -1,7 +1,7 @@
 """Images of a chrome grating with a particle of dust, and what is measured in them."""
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from attrs.validators import gt
 
 from afm_scan_bench.paper.grating import GratingFigures, grating_figures
@@ -70,7 +70,8 @@ class Picture:
 def picture(scan: PaperScan) -> Picture:
     """Image the specimen along a scan and measure the image."""
     spec = scan.spec
-    frame = frame_of(spec, min(PIXELS, spec.samples_per_line // 2 - 1), left=0.0)
+    centred = evolve(spec, centre_x=0.5 * spec.range_x)
+    frame = frame_of(centred, min(PIXELS, spec.samples_per_line // 2 - 1))
     rows = np.linspace(0.0, spec.range_y, spec.lines)
     lines = list(LineImager(spec, frame).add(scan.desired.x, heights_along(scan)))
     trace = np.stack([line.trace for line in lines])
