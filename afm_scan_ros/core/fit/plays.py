@@ -144,17 +144,26 @@ class Plays:
         """Precision of the prior of a group.
 
         The density is smooth in the logarithm of the threshold, with a rough part; that of the
-        drive itself, the first, is nearly free.
+        drive itself, the first, is nearly free. That of plays which move once, from rest, is not
+        foretold by the others: where no record began at rest, it is none.
         """
         if name == "correction":
             return self._smooth_correction / scales["correction"] ** 2
-        plays = len(self.thresholds) - 1
-        bent = _bends(np.log(self.thresholds[1:]))
-        smooth = (
-            bent.T @ bent / scales["smooth_density"] ** 2 + np.eye(plays) / self.settings.density**2
-        )
-        rough = scales["rough_density"] ** 2 * np.eye(plays)
-        return np.asarray(block_diag(1.0, np.linalg.inv(np.linalg.inv(smooth) + rough)))
+        often = self.thresholds[1:] <= self.half
+        parts = [
+            self._smooth_density(np.log(self.thresholds[1:][some]), scales)
+            for some in (often, ~often)
+            if some.any()
+        ]
+        return np.asarray(block_diag(1.0, *parts))
+
+    def _smooth_density(self, places: Array, scales: Mapping[str, float]) -> Array:
+        """Precision of a density that is smooth over places, (plays,), but for its rough part."""
+        plays = np.eye(len(places))
+        bent = _bends(places)
+        smooth = bent.T @ bent / scales["smooth_density"] ** 2 + plays / self.settings.density**2
+        rough = scales["rough_density"] ** 2 * plays
+        return np.asarray(np.linalg.inv(np.linalg.inv(smooth) + rough))
 
     @cached_property
     def _smooth_correction(self) -> Array:
@@ -454,8 +463,8 @@ def _moments(drive: Array, thresholds: Array, plays: Array, edges: Edges) -> tup
 
 def _bends(places: Array) -> Array:
     """Second differences over uneven places, shape (n - 2, n), per unit of the mean distance."""
-    unit = (places[-1] - places[0]) / (len(places) - 1)
-    result = np.zeros((len(places) - 2, len(places)))
+    unit = (places[-1] - places[0]) / max(len(places) - 1, 1)
+    result = np.zeros((max(len(places) - 2, 0), len(places)))
     for i in range(len(result)):
         before, after = np.diff(places[i : i + 3]) / unit
         bend = np.array([1.0 / before, -1.0 / before - 1.0 / after, 1.0 / after])
