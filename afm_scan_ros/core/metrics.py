@@ -37,6 +37,20 @@ class Figure:
 
 
 @frozen
+class ErrorSplit:
+    """The straight line of an error against the desired position, and what it leaves.
+
+    ``offset`` is the line at the scan's centre, ``gain`` its slope, and ``shape`` the rms of what
+    remains, in m and as a share of the planned range. An image shows them differently.
+    """
+
+    offset: float = field(metadata=METRES)
+    gain: float
+    shape: float = field(metadata=METRES)
+    shape_share: float
+
+
+@frozen
 class AxisError:
     """The error of one axis. Sets that hold no sample are None.
 
@@ -44,7 +58,8 @@ class AxisError:
     what the desired displacement spans on the lines so far.
     ``all``, ``constant_speed`` and ``turnarounds`` leave out the first to-and-fro, which stands
     in ``first_line`` alone; so do ``trace`` (the constant-speed part of all traces) and ``step``
-    (the smooth steps of y). ``approach`` and ``preparation`` come before the lines.
+    (the smooth steps of y). ``approach`` and ``preparation`` come before the lines. ``split`` is
+    that of ``constant_speed`` in x and of ``trace`` in y, None where these hold one position.
     """
 
     planned_range: float = field(metadata=METRES)
@@ -57,6 +72,7 @@ class AxisError:
     first_line: Figure | None
     approach: Figure | None
     preparation: Figure | None
+    split: ErrorSplit | None
     repeatability: float | None = field(metadata=METRES)
 
 
@@ -124,6 +140,31 @@ class ErrorSum:
         return Figure(rms, self.largest, rms / full, self.largest / full, self.count)
 
 
+@frozen(eq=False)
+class LineSum:
+    """Products of 1, the position from the centre over the range, and the error, summed."""
+
+    products: Array = field(factory=lambda: np.zeros((3, 3)))
+
+    def plus(self, position: Array, error: Array) -> "LineSum":
+        """Return the sums with samples added, both of shape (n,)."""
+        rows = np.stack([np.ones_like(error), position, error])
+        return LineSum(self.products + rows @ rows.T)
+
+    def split(self, full: float) -> ErrorSplit | None:
+        """Return offset, gain and shape for an axis of the planned range ``full``, m."""
+        matrix, right, squares = self.products[:2, :2], self.products[:2, 2], self.products[2, 2]
+        if np.linalg.matrix_rank(matrix) < len(matrix):
+            return None
+        line = np.linalg.solve(matrix, right)
+        shape = float(np.sqrt(max(squares - right @ line, 0.0) / matrix[0, 0]))
+        return ErrorSplit(float(line[0]), float(line[1]) / full, shape, shape / full)
+
+
+SPLIT = {"x": "constant_speed", "y": "trace"}
+"""The set of each axis whose error is split."""
+
+
 @define
 class LineMeter:
     """Compares the lines of a to-and-fro scan, in constant memory."""
@@ -177,6 +218,7 @@ class TrackingMeter:
     _sums: defaultdict[tuple[str, str], ErrorSum] = field(factory=lambda: defaultdict(ErrorSum))
     _lowest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, np.inf))
     _highest: dict[str, float] = field(factory=lambda: dict.fromkeys(AXES, -np.inf))
+    _straight: dict[str, LineSum] = field(factory=lambda: {axis: LineSum() for axis in AXES})
     _lines: LineMeter = field(init=False)
 
     def __attrs_post_init__(self) -> None:
@@ -191,6 +233,9 @@ class TrackingMeter:
             error = achieved.axis(axis) - desired.axis(axis)
             for name, mask in sets.items():
                 self._sums[axis, name] = self._sums[axis, name].plus(error[mask])
+            counted, (centre, full) = sets[SPLIT[axis]], self.spec.extent(axis)
+            position = (desired.axis(axis)[counted] - centre) / full
+            self._straight[axis] = self._straight[axis].plus(position, error[counted])
             self._extend_range(axis, desired)
         if self.spec.pattern in TO_AND_FRO:
             self._lines.add(desired, achieved)
@@ -218,14 +263,15 @@ class TrackingMeter:
         self._highest[axis] = max(self._highest[axis], values.max(initial=-np.inf))
 
     def _axis(self, axis: str, repeatability: float | None) -> AxisError:
-        planned = {"x": self.spec.range_x, "y": self.spec.range_y}[axis]
+        _, planned = self.spec.extent(axis)
         figures = {
             name: error_sum.figure(planned)
             for (of, name), error_sum in self._sums.items()
             if of == axis
         }
         spanned = max(0.0, float(self._highest[axis] - self._lowest[axis]))
-        return AxisError(planned, spanned, repeatability=repeatability, **figures)
+        split = self._straight[axis].split(planned)
+        return AxisError(planned, spanned, split=split, repeatability=repeatability, **figures)
 
 
 def _sets(spec: ScanSpec, run: Trace) -> dict[str, NDArray[np.bool_]]:

@@ -100,6 +100,11 @@ def error_rows(tracking: Tracking) -> list[TextRow]:
         if of is not None
     ]
     for axis, error in (("x", x), ("y", y)):
+        if split := error.split:
+            offset = _sized(split.offset, split.offset / error.planned_range)
+            rows.append((f"{axis}, offset", *offset, "", ""))
+            rows.append((f"{axis}, gain", "", percent(split.gain), "", ""))
+            rows.append((f"{axis}, shape", *_sized(split.shape, split.shape_share), "", ""))
         if (size := error.repeatability) is not None:
             cells = _sized(size, size / error.planned_range)
             rows.append((f"{axis}, line-to-line repeatability", *cells, "", ""))

@@ -9,7 +9,7 @@ from attrs import evolve
 
 from afm_scan_ros.core.compensation import Compensation
 from afm_scan_ros.core.errors import InputError
-from afm_scan_ros.core.metrics import Figure, Scan, Tracking
+from afm_scan_ros.core.metrics import AxisError, ErrorSplit, Figure, Scan, Tracking
 from afm_scan_ros.core.model import InverseSettings, ScannerModel
 from afm_scan_ros.core.scan_spec import ScanSpec
 from afm_scan_ros.core.trajectory import desired, phases, sample_kinds, total_samples
@@ -77,6 +77,13 @@ def scan(
 def tracking(done: Scan) -> Tracking:
     """Figures of the true, noise-free displacement of a scan."""
     return done.tracking("true")
+
+
+def split_of(error: AxisError) -> ErrorSplit:
+    """Offset, gain and shape of an error; ValueError where its samples hold one position."""
+    if error.split is None:
+        raise ValueError("the samples hold one position")
+    return error.split
 
 
 def rms_percent(figure: Figure | None) -> float:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -176,3 +177,24 @@ def test_the_figures_serialise_with_their_units() -> None:
     assert text["x"]["all"]["rms_m"] == pytest.approx(1e-9)
     assert text["x"]["all"]["rms_share"] == pytest.approx(1e-9 / SPEC.range_x)
     assert set(text) == {"displacement", "samples", "lines", "x", "y", "mismatch"}
+
+
+@given(offset=st.floats(-1e-6, 1e-6), gain=st.floats(-0.02, 0.02), seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=30)
+def test_the_error_is_split_into_offset_gain_and_shape(
+    offset: float, gain: float, seed: int
+) -> None:
+    """The offset is that at the scan's centre, and shape what a straight line leaves."""
+    spec = evolve(SPEC, centre_x=7e-6, centre_y=-3e-6)
+    path, (x, y) = desired(spec, 0, TOTAL), noise(seed)
+    found = measured(offset + gain * (path.x - 7e-6) + x, offset + gain * (path.y + 3e-6) + y, spec)
+    for axis in (found.x, found.y):
+        assert axis.split is not None
+        assert axis.split.offset == pytest.approx(offset, abs=2e-10)
+        assert axis.split.gain == pytest.approx(gain, abs=1e-5)
+        assert axis.split.shape == pytest.approx(1e-9, rel=0.1)
+        assert axis.split.shape_share == axis.split.shape / 40e-6
+
+
+def test_one_position_has_no_gain() -> None:
+    assert measured(1e-9, 1e-9, evolve(SPEC, lines=2)).y.split is None

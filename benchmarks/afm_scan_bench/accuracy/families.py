@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from attrs import evolve
 
-from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FAMILIES, MAPS, FamilyScanner
-from afm_scan_bench.scans import spec_at
+from afm_scan_bench.scans import rms_percent, spec_at, tracking
 from afm_scan_ros.core.errors import InputError, ScanError
 from afm_scan_ros.core.identification.identify import FittedAxis, identify_axis
 from afm_scan_ros.report.table import Row, Table
@@ -70,7 +69,8 @@ def errors(scanner: FamilyScanner, found: FittedAxis, share: float) -> Row:
         spec = evolve(spec_at(rate), range_x=extent, range_y=extent)
         name = "rms_percent" if rate == RATES[0] else f"rms_percent_{rate:g}"
         try:
-            row[name] = 100.0 * error_parts(scanner.scan(spec, found.model)).rms / extent
+            done = scanner.scan(spec, found.model)
+            row[name] = rms_percent(tracking(done).x.constant_speed)
         except (InputError, ScanError) as error:
             row["refused"] = str(error)
     return row

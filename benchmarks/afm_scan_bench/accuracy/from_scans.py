@@ -11,9 +11,8 @@ from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_bench.families.operators import LIMIT
-from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FAMILIES, FamilyScanner
-from afm_scan_bench.scans import SEED, spec_at
+from afm_scan_bench.scans import SEED, rms_percent, spec_at, tracking
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import desired, total_samples
 from afm_scan_ros.core.types import Array, Trace
@@ -92,4 +91,4 @@ def _tracked(scanner: FamilyScanner, invert: Callable[[Array, float], Array]) ->
     drive = invert(target.x, period)
     measured, true = scanner.displacement(drive, period, SEED)
     both = (Trace(0, period, each, each) for each in (drive, measured, true))
-    return 100.0 * error_parts(Scan(spec, target, *both)).rms / extent
+    return rms_percent(tracking(Scan(spec, target, *both)).x.constant_speed)

@@ -8,10 +8,18 @@ from collections.abc import Callable, Iterator
 
 from attrs import evolve
 
-from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.families.scanners import FamilyScanner
 from afm_scan_bench.in_process import calibrate_in_process
-from afm_scan_bench.scans import ALL, SEED, default_plant, scan, spec_at
+from afm_scan_bench.scans import (
+    ALL,
+    SEED,
+    default_plant,
+    rms_percent,
+    scan,
+    spec_at,
+    split_of,
+    tracking,
+)
 from afm_scan_ros.core.identification.identify import identify_axis, identify_records
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.scan_spec import ScanSpec
@@ -56,14 +64,15 @@ def rows_of(name: str, scanned: Callable[[ScanSpec], Scan]) -> Iterator[Row]:
     for rate in RATES:
         for size in SIZES_UM:
             extent = 1e-6 * size
-            parts = error_parts(scanned(evolve(spec_at(rate), range_x=extent, range_y=extent)))
+            error = tracking(scanned(evolve(spec_at(rate), range_x=extent, range_y=extent))).x
+            split = split_of(error)
             yield {
                 "scanner": name,
                 "line_rate_hz": rate,
                 "size_um": size,
-                "rms_percent": 100.0 * parts.rms / extent,
-                "gain_percent": 100.0 * parts.gain,
-                "shape_percent": 100.0 * parts.shape / extent,
-                "shape_nm": 1e9 * parts.shape,
-                "offset_nm": 1e9 * parts.offset,
+                "rms_percent": rms_percent(error.constant_speed),
+                "gain_percent": 100.0 * split.gain,
+                "shape_percent": 100.0 * split.shape_share,
+                "shape_nm": 1e9 * split.shape,
+                "offset_nm": 1e9 * split.offset,
             }

@@ -10,10 +10,9 @@ from attrs import evolve, frozen
 from numpy.typing import ArrayLike
 
 import afm_scan_ros as afm
-from afm_scan_bench.families.parts import error_parts
 from afm_scan_bench.images.acquire import Frame
 from afm_scan_bench.images.tube_scanner import TubeScanner
-from afm_scan_bench.scans import rms_percent, tracking
+from afm_scan_bench.scans import rms_percent, split_of, tracking
 from afm_scan_ros.core.errors import ScanError
 from afm_scan_ros.core.metrics import Scan
 from afm_scan_ros.core.trajectory import phases
@@ -89,7 +88,7 @@ def error_of(scanner: TubeScanner, frame: Frame, rate: float, inverse: Inverse) 
         done = scanned(scanner, spec_of(frame, rate), inverse)
     except ScanError:
         return TrackingError(np.nan, np.nan)
-    parts, spread = error_parts(done), tracking(done).x.peak_to_peak
-    varying = np.sqrt(parts.rms**2 - parts.offset**2)
-    whole = rms_percent(tracking(done).x.constant_speed)
-    return TrackingError(whole, float(100.0 * varying / spread))
+    error = tracking(done).x
+    whole, offset = rms_percent(error.constant_speed), split_of(error).offset
+    varying = np.sqrt(whole**2 - (100.0 * offset / error.planned_range) ** 2)
+    return TrackingError(whole, float(varying))
