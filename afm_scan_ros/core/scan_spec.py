@@ -110,7 +110,9 @@ class ScanSpec:
     approach: float = parameter(
         0.1, "Time from rest at zero to the first line", gt(0.0), suffix="_s"
     )
-    settle: float = parameter(0.1, "Time from the last line to rest at zero", gt(0.0), suffix="_s")
+    settle: float = parameter(
+        0.1, "Time from the last line to rest at the centre", gt(0.0), suffix="_s"
+    )
     centre_x: float = parameter(0.0, "Displacement in the scan's middle, x", *REACHED, suffix="_um")
     centre_y: float = parameter(0.0, "Displacement in the scan's middle, y", *REACHED, suffix="_um")
 
@@ -197,6 +199,10 @@ class ScanSpec:
         )
         ranged = evolve(self, range_x=range_x, range_y=range_y)
         return evolve(ranged, preparation_lower=lower, preparation_upper=upper)
+
+    def extent(self, axis: str) -> tuple[float, float]:
+        """Return the centre and the range of an axis, m."""
+        return getattr(self, f"centre_{axis}"), getattr(self, f"range_{axis}")
 
     @property
     def sample_period(self) -> float:

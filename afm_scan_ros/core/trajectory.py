@@ -5,7 +5,8 @@ defined for every sample number, before its first line and after its last one to
 the settling are that continuation under an envelope that rises from 0 to 1 and falls back. So they
 join without a jump in position, nor in velocity where the pattern itself has none, and never leave
 the scan's range. The scan's centre is added to all of them: it is approached in the first cycle of
-the preparation, or where there is none with the pattern, and left in the settling.
+the preparation, or where there is none with the pattern, and held to the end. From there the driver
+ramps down, for a unipolar scanner with hysteresis has no drive that brings it back to zero.
 """
 
 from collections.abc import Callable, Mapping
@@ -153,7 +154,7 @@ class Phases:
 
 
 def phases(spec: ScanSpec) -> Phases:
-    """Return where each phase of a scan lies; the very last sample is at rest at zero."""
+    """Return where each phase of a scan lies; the very last sample is at rest at the centre."""
     prepared = 0
     if spec.preparation != "none":
         prepared = round(spec.preparation_cycles / (spec.preparation_rate * spec.sample_period))
@@ -173,7 +174,7 @@ def total_samples(spec: ScanSpec) -> int:
 
 
 def settle_samples(spec: ScanSpec) -> int:
-    """Samples from the last line's end to rest at zero."""
+    """Samples from the last line's end to rest."""
     return max(1, round(spec.settle / spec.sample_period))
 
 
@@ -260,21 +261,23 @@ PATTERN: Mapping[str, Pattern] = {
 
 
 def desired(spec: ScanSpec, first: int, count: int) -> Trace:
-    """Desired displacement (m) of ``count`` samples, by their numbers alone; zero after the end."""
+    """Desired displacement (m) of ``count`` samples, by their numbers alone; at rest at its end."""
     x, y = _displacement(spec, np.arange(first, first + count, dtype=np.int64))
     return Trace(first, spec.sample_period, x, y)
 
 
 def stopped(spec: ScanSpec, stop: int, first: int, count: int) -> Trace:
-    """Desired displacement (m) of a scan stopped at a sample: it fades within the settling time."""
+    """Desired displacement (m) of a scan stopped at a sample: it settles towards the centre."""
     samples = np.arange(first, first + count, dtype=np.int64)
     x, y = _displacement(spec, samples)
+    held_x, held_y = _centre(spec, samples)
     envelope = 1.0 - smooth_step((samples - stop) / settle_samples(spec))
-    return Trace(first, spec.sample_period, envelope * x, envelope * y)
+    x, y = held_x + envelope * (x - held_x), held_y + envelope * (y - held_y)
+    return Trace(first, spec.sample_period, x, y)
 
 
 def stopped_total(spec: ScanSpec, stop: int) -> int:
-    """Samples in a scan that is stopped at sample ``stop``; the last one is at rest at zero."""
+    """Samples in a scan that is stopped at sample ``stop``; the last one is at rest."""
     return min(phases(spec).total, stop + settle_samples(spec) + 1)
 
 
@@ -291,9 +294,9 @@ def _displacement(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Ar
         envelope = _envelope(spec, numbers)
         x[early:over], y[early:over] = envelope * pattern_x, envelope * pattern_y
     if spec.centre_x != 0.0 or spec.centre_y != 0.0:
-        held = _held(spec, samples[:over])
-        x[:over] += spec.centre_x * held
-        y[:over] += spec.centre_y * held
+        held_x, held_y = _centre(spec, samples)
+        x += held_x
+        y += held_y
     return x, y
 
 
@@ -306,15 +309,15 @@ def _envelope(spec: ScanSpec, samples: NDArray[np.int64]) -> Array | float:
     return rise * (1.0 - smooth_step((samples - end) / settle_samples(spec)))
 
 
-def _held(spec: ScanSpec, samples: NDArray[np.int64]) -> Array:
-    """Share of the centre that is held at sample numbers from the scan's start."""
+def _centre(spec: ScanSpec, samples: NDArray[np.int64]) -> tuple[Array, Array]:
+    """What is held of the centre, m, at sample numbers from the scan's start."""
     where = phases(spec)
     if spec.preparation == "none":
         rise = (samples - where.approach.start) / len(where.approach)
     else:
         rise = _prepared_cycles(spec, samples)
-    fall = smooth_step((samples - where.lines.stop) / settle_samples(spec))
-    return np.asarray(smooth_step(rise) * (1.0 - fall))
+    held = smooth_step(rise)
+    return spec.centre_x * held, spec.centre_y * held
 
 
 def trajectory(spec: ScanSpec) -> Array:
@@ -328,8 +331,8 @@ def trajectory(spec: ScanSpec) -> Array:
     Returns
     -------
     ndarray
-        m, shape (n, 2): x and y, every ``spec.sample_period``. It begins and ends at rest at zero,
-        after the preparation, the approach and the settling of ``spec``.
+        m, shape (n, 2): x and y, every ``spec.sample_period``. It begins at rest at zero, before
+        the preparation and the approach of ``spec``, and ends at its centre, after the settling.
 
     Raises
     ------

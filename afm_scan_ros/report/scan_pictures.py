@@ -272,9 +272,9 @@ def image_picture(name: str, images: Images, how: str) -> Picture:
     ``how`` says how it was scanned, as "at 30 Hz with 64 lines".
     """
     spec = images.spec
-    ends_of = ((spec.centre_x, spec.range_x), (spec.centre_y, spec.range_y))
-    x0, x1, y0, y1 = (MICRO * (c + way * w) for c, w in ends_of for way in (-0.5, 0.5))
-    span = x0, x1, y0, y1
+    centred = (MICRO * np.array(spec.extent(axis)) for axis in AXES)
+    (left, right), (low, high) = ((at - 0.5 * wide, at + 0.5 * wide) for at, wide in centred)
+    span = float(left), float(right), float(low), float(high)
     wrong = [NANO * (image - images.ideal) for image in images.imaged]
     ends = float(NANO * images.ideal.min()), float(NANO * images.ideal.max())
     largest = float(np.abs(wrong).max())

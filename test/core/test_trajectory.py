@@ -119,18 +119,20 @@ def test_it_never_leaves_the_range_nor_the_preparation(spec: ScanSpec) -> None:
 def test_a_centre_moves_the_whole_scan(
     spec: ScanSpec, x: float, y: float, data: st.DataObject
 ) -> None:
-    """It is held on all lines, approached before and left after them, and never passed."""
+    """It is approached before the lines, never passed, and held to the end, also of a stop."""
     about, trace, where = whole(spec), whole(evolve(spec, centre_x=x, centre_y=y)), phases(spec)
     cut = data.draw(st.integers(0, where.total))
     later = desired(evolve(spec, centre_x=x, centre_y=y), cut, where.total - cut)
+    ended = stopped(evolve(spec, centre_x=x, centre_y=y), cut, cut, len(where.settle) + 1)
     for axis, centre in (("x", x), ("y", y)):
         assert np.array_equal(trace.axis(axis)[cut:], later.axis(axis))
         held = trace.axis(axis) - about.axis(axis)
-        assert held[[0, -1]].tolist() == [0.0, 0.0]
-        assert on_lines(spec, held) == pytest.approx(centre, rel=1e-9, abs=1e-18)
-        rising = np.diff(held * np.sign(centre))
-        assert np.all(rising[: where.lines.start] >= -1e-18)
-        assert np.all(rising[where.lines.start :] <= 1e-18)
+        assert held[0] == 0.0
+        assert held[where.lines.start :] == pytest.approx(centre, rel=1e-9, abs=1e-18)
+        assert np.all(np.diff(held * np.sign(centre)) >= -1e-18)
+        assert trace.axis(axis)[-1] == centre
+        end = min(cut + len(where.settle), where.total - 1)
+        assert ended.axis(axis)[-1] == pytest.approx(held[end], abs=1e-18)
 
 
 def fastest_x(spec: ScanSpec) -> float:
