@@ -40,7 +40,14 @@ class Repetition:
 
     def between(self, signals: Array) -> Array:
         """Coefficients (m, k) of the part between the harmonics, of signals (m, n)."""
-        found = self._changing(dct(signals[:, self.first : self.last], norm="ortho"))
+        return self._between(signals[:, self.first : self.last])
+
+    def part_between(self, signal: Array) -> Array:
+        """Part between the harmonics of a signal (count,) that begins with the repetition."""
+        return self.signal(self._between(signal[np.newaxis])[0])
+
+    def _between(self, parts: Array) -> Array:
+        found = self._changing(dct(parts, norm="ortho"))
         found[:, : self.below] = 0.0
         return found
 

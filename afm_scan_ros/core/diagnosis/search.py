@@ -116,11 +116,14 @@ class Posterior:
 def _simplest(trials: tuple[FittedCandidates, ...]) -> FittedCandidates:
     """Trial of the fewest parameters among those that are not far less probable than the first.
 
-    Numbers that the records do not determine are left out so.
+    Numbers that the records do not determine are left out so. One that lacks something gives way.
     """
-    least = trials[0].log_posterior + np.log(SEARCH.as_probable)
-    near = (trial for trial in trials if trial.log_posterior >= least)
-    return min(near, key=lambda trial: trial.fit.rows.shape[1])
+    first = trials[0].log_posterior
+    near = [t for t in trials if t.log_posterior >= first + np.log(SEARCH.near)]
+    adequate = [t for t in near if t.cells.adequate] or near
+    least = adequate[0].log_posterior + np.log(SEARCH.as_probable)
+    as_probable = (t for t in adequate if t.log_posterior >= least)
+    return min(as_probable, key=lambda trial: trial.fit.rows.shape[1])
 
 
 def _distinct(trials: Iterable[FittedCandidates]) -> tuple[FittedCandidates, ...]:

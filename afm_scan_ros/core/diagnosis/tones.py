@@ -47,13 +47,17 @@ def without_tones(
     of: Repetition | None,
     settings: PartingSettings = PARTING,
 ) -> Array:
-    """Residual (n,) without its lines that last, one after the other."""
+    """Residual (n,) without its lines that last, one after the other.
+
+    Of a tone only what is between the harmonics is in a residual that is.
+    """
     left = residual
     for _ in range(settings.tones):
         found = lasting_lines(left, sample_period, of, settings)
         if not found:
             break
-        left = left - _tone(left, sample_period, found[0])
+        tone = _tone(left, sample_period, found[0])
+        left = left - (of.part_between(tone) if of else tone)
     return left
 
 

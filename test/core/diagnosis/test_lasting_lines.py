@@ -66,3 +66,13 @@ def test_what_is_left_without_tones_is_the_noise(size: float) -> None:
     seen = noise(3) + tone(333.3, size) + tone(1234.5, 0.5 * size)
     left = without_tones(seen, PERIOD, None)
     assert np.std(left - noise(3)) < 0.1
+
+
+@pytest.mark.parametrize("periods", [20.0, 30.4])
+def test_what_is_left_between_harmonics_without_tones_is_the_noise(periods: float) -> None:
+    """A tone leaves its share of every harmonic, so that what is between them is no tone."""
+    of, rate = Repetition(0, COUNT, periods), periods / (COUNT * PERIOD)
+    clear = of.part_between(noise(3))
+    hum = np.sum([tone(k * 1.4 * rate, 30.0 / k) for k in (1, 2, 3)], axis=0)
+    seen = clear + of.part_between(hum)
+    assert np.std(without_tones(seen, PERIOD, of) - clear) < 0.2

@@ -105,6 +105,18 @@ def test_a_set_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred
     assert found.likeliest == chosen
 
 
+@pytest.mark.parametrize(("relative", "kind"), [(0.014, "hum"), (0.007, "")])
+def test_a_form_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferred(
+    relative: float, kind: str
+) -> None:
+    """One tone stands for a hum only where the other harmonics are not missed."""
+    lacking = trial(0.0, ("periodic_disturbance", ""))
+    lacking = evolve(lacking, cells=evolve(lacking.cells, power=np.full(1, 1e6)))
+    hum = trial(float(np.log(relative)), ("periodic_disturbance", "hum"))
+    (best,) = Posterior.of(no_effect(fit(-90.0)), [lacking, hum]).best.values()
+    assert best.candidates[0].form.kind == kind
+
+
 @given(left=st.floats(1e-3, 1e3), counts=st.floats(1.0, 100.0))
 def test_an_effect_that_tells_the_shape_beats_what_has_any(left: float, counts: float) -> None:
     """By half a logarithm of what it explains a coefficient; one that explains nothing by none."""
