@@ -12,7 +12,7 @@ from afm_scan_ros.core.diagnosis.evidence import Evidence, decimated, repeating
 from afm_scan_ros.core.diagnosis.fit import Fit, Problem, inserted
 from afm_scan_ros.core.diagnosis.likelihood import CellFit, Likelihood
 from afm_scan_ros.core.diagnosis.settings import SEARCH
-from afm_scan_ros.core.effects.effect_type import EffectForm, EffectType
+from afm_scan_ros.core.effects.effect_type import EffectForm, EffectParameter, EffectType
 from afm_scan_ros.core.effects.registry import CATALOGUE
 from afm_scan_ros.core.effects.residual_features import ResidualFeatures
 from afm_scan_ros.core.effects.scale import Scale, scale_of
@@ -69,10 +69,19 @@ class FittedCandidates:
     @property
     def at_end(self) -> bool:
         """Whether a value is at an end of its range, where the effect is not as the catalogue's."""
+        return any(parameter.at_end(value, half) for parameter, value, half in self._numbers)
+
+    @property
+    def may_be_at_end(self) -> bool:
+        """Whether the interval of a value holds an end of its range."""
+        return any(not p.lower < v - half <= v + half < p.upper for p, v, half in self._numbers)
+
+    @property
+    def _numbers(self) -> Iterator[tuple[EffectParameter, float, float]]:
+        """Parameters of the effects, their values and half their intervals."""
         each = [p for candidate in self.candidates for p in candidate.form.parameters]
         own = slice(len(self.fit.values) - len(each), None)
-        numbers = zip(each, self.fit.values[own], self.fit.halfwidth[own], strict=True)
-        return any(parameter.at_end(value, half) for parameter, value, half in numbers)
+        return zip(each, self.fit.values[own], self.fit.halfwidth[own], strict=True)
 
     def part(self, place: int) -> slice:
         """Where the parameters of one of the candidates stand among those of all."""

@@ -1,7 +1,5 @@
 """Probabilities of sets of effects: forms are summed, and a set of forms counts once."""
 
-from typing import cast
-
 import numpy as np
 import pytest
 from attrs import evolve
@@ -27,10 +25,9 @@ def trial(nats: float, *forms: tuple[str, str]) -> FittedCandidates:
     """Trial whose posterior is so many nats."""
     candidates = tuple(Candidate(effect_type(n), effect_type(n).form(k)) for n, k in forms)
     prior = sum(LOG_ODDS - np.log(len(c.effect.forms)) for c in candidates)
-    found = FittedCandidates(
-        candidates, cast("Fit", Fit(np.ones((1, 1)), np.ones(1), 0.0)), fit(0.0)
-    )
-    return FittedCandidates(candidates, found.fit, fit(nats - prior))
+    values = np.concatenate([c.form.example for c in candidates])
+    found = Fit(values[np.newaxis], np.zeros(len(values)))
+    return FittedCandidates(candidates, found, fit(nats - prior))
 
 
 DELAY, LAG = ("delay", ""), ("input_lag", "")
@@ -115,6 +112,27 @@ def test_a_form_of_a_hundredth_of_the_probability_that_lacks_nothing_is_preferre
     hum = trial(float(np.log(relative)), ("periodic_disturbance", "hum"))
     (best,) = Posterior.of(no_effect(fit(-90.0)), [lacking, hum]).best.values()
     assert best.candidates[0].form.kind == kind
+
+
+STIFFNESS = ("hysteretic_stiffness", "")
+
+
+@pytest.mark.parametrize(
+    ("likelier", "threshold", "kept"),
+    [(0.0, 1e-10, False), (2.9, 1e-10, False), (3.1, 1e-10, True), (0.0, 1e-7, True)],
+)
+def test_an_effect_that_is_a_simpler_one_at_an_end_of_its_range_is_no_rival(
+    likelier: float, threshold: float, *, kept: bool
+) -> None:
+    """Plays of no width leave a softer spring, as a gain does; two numbers more gain 3 nats."""
+    gain = evolve(trial(0.0, ("parameter_shift", "gain")), cells=fit(-20.0))
+    yields = evolve(
+        trial(0.0, STIFFNESS),
+        cells=fit(likelier - 20.0),
+        fit=Fit(np.array([[0.01, threshold, 0.5]]), np.array([1e-3, 1e-8, 0.1])),
+    )
+    found = Posterior.of(no_effect(fit(-90.0)), [gain, yields])
+    assert (("hysteretic_stiffness",) in found.logs) is kept
 
 
 @given(left=st.floats(1e-3, 1e3), counts=st.floats(1.0, 100.0))
