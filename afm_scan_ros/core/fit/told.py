@@ -78,9 +78,11 @@ class Knowledge:
     def variants(self) -> tuple[Variant, tuple[Variant, ...]]:
         """Return the fit's own effects, and those in each direction of what is not known.
 
-        Where the records do not tell the hysteresis, nor do they tell the scales of its prior.
+        Where the records do not tell how loops open, of the whole range or as small as those of the
+        smallest scans, nor do they tell the scales of the hysteresis' prior.
         """
-        told = _hysteresis(self).status is not Status.UNKNOWN
+        smallest = 0.5 ** (self.fit.layout.settings.spread_sizes - 1)
+        told = all(self.tells(_opening(self.fit, share)[1]) for share in (1.0, smallest))
         return variants(self.fit, self.wider if told else self.widest, self.every)
 
     def effects(self) -> BaseEffects:
@@ -130,10 +132,14 @@ def _hysteresis(known: Knowledge) -> EffectStatus:
     )
 
 
-def _opening(fit: AxisFit) -> tuple[float, Array]:
-    """F (V) in the middle of the largest loop on its way down less that up, and its row."""
+def _opening(fit: AxisFit, share: float = 1.0) -> tuple[float, Array]:
+    """F (V) in the middle of a loop on its way down less that up, and its row.
+
+    The loop is over a share of the range about its middle.
+    """
     operator, count = fit.layout.operator, fit.layout.settings.direct_levels
-    up = np.linspace(operator.lower, operator.upper, 2 * count + 1)
+    middle, half = 0.5 * (operator.lower + operator.upper), share * operator.half
+    up = np.linspace(middle - half, middle + half, 2 * count + 1)
     drive = np.concatenate([up, up[-2::-1]])
     theta, (used, _) = (
         fit.layout.of_operator(fit.theta),

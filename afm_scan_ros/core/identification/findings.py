@@ -56,7 +56,7 @@ class ReadAfterUpdate(Finding):
 
 @frozen
 class UncertainScan(Finding):
-    """Records that tell a scan over the whole drive to a ``share`` of its range only."""
+    """Records that tell scans of some size to a ``share`` of their range only."""
 
     share: float
 
@@ -89,7 +89,7 @@ def findings_of(
 ) -> Iterator[Finding]:
     """Yield what a user should know of the records and of the fit before trusting the model.
 
-    ``deviation`` is the standard deviation of a predicted scan over its range.
+    ``deviation`` is the standard deviation of a predicted scan over its range, of the worst size.
     """
     yield from _of_records(fit)
     if sensor := fit.layout.sensor_of(fit.theta):

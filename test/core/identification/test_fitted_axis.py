@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
+from scipy import signal
 
 import afm_scan_ros as afm
 from afm_scan_ros.core.effects.base import Cascade
@@ -228,6 +229,16 @@ def test_steps_alone_tell_creep_and_not_hysteresis() -> None:
     assert within(interval, CREEP[0])
     (finding,) = (each for each in found.warnings if isinstance(each, UncertainScan))
     assert finding.share == found.deviation
+
+
+def test_loops_of_one_size_do_not_tell_smaller_ones() -> None:
+    """Of one state they look like those of plays, which open otherwise where they are smaller."""
+    seconds = 1e-3 * np.arange(3000)
+    drive = 3.5 * signal.sawtooth(2.0 * np.pi * seconds + 0.5 * np.pi, 0.5)
+    noise = np.random.default_rng(3).normal(0.0, 5e-10, len(drive))
+    triangles = Record(drive, 1e-6 * of_bouc_wen(drive) + noise, 1e-3, name="triangles")
+    found = identify_axis([triangles], "x")
+    assert any(isinstance(each, UncertainScan) for each in found.warnings)
 
 
 def test_hum_in_a_record_is_named_with_its_amplitude() -> None:
