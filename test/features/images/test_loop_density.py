@@ -8,7 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from afm_scan_ros.core.effects.hysteresis.everett import BeyondRangeError
 from afm_scan_ros.core.effects.hysteresis.preisach import Preisach
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.loops.density import (
     CellGrid,
@@ -108,11 +107,3 @@ def test_each_sample_counts_once(sizes: list[tuple[int, int]]) -> None:
         counted = sum(float(one.samples.sum()) for one in rows_of_record)
         seen = min(len(record.drive), ROWS * rows_of_record[0].every)
         assert abs(counted - seen) <= 1.5 * sum(one.every for one in rows_of_record)
-
-
-LOOPS = np.interp(np.arange(600), np.linspace(0, 600, 7), [0.0, UPPER, LOWER, 0.1, 0.0, 2.0, 0.0])
-
-
-def test_a_record_at_rest_is_refused() -> None:
-    with pytest.raises(InputError, match="drive or displacement rests"):
-        MovingRecord("still", LOOPS, np.zeros(600), SAMPLE_PERIOD, np.ones(600, bool))

@@ -22,7 +22,7 @@ from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.types import Array
 from afm_scan_ros.features.images.grating.motion import spline_basis
-from afm_scan_ros.features.images.loops.moving import LinearDynamics, Swept, loop_parts
+from afm_scan_ros.features.images.loops.moving import LinearDynamics, LoopPart, Swept, loop_parts
 
 POWERS = 3
 """Degree of the curve f."""
@@ -177,10 +177,9 @@ class _RepeatedMotion:
 
     def solved(self, numbers: Array) -> tuple[Array, Array]:
         """Weights (m) that fit best, and what they miss, each row times its samples' root."""
-        pairs = [one.weighted(self.dynamics) for one in self.rows(numbers)]
-        areas, moved = (np.concatenate(each) for each in zip(*pairs, strict=True))
-        weights = np.linalg.lstsq(areas, moved, rcond=None)[0]
-        return weights, moved - areas @ weights
+        whole = LoopPart.together([one.whole(self.dynamics) for one in self.rows(numbers)])
+        weights = np.asarray(np.linalg.lstsq(whole.areas, whole.moved, rcond=None)[0], float)
+        return weights, whole.moved - whole.areas @ weights
 
     def held_out(self, numbers: Array, weights: Array) -> float:
         """Rms (m) by which each part is missed by a fit of the others, linearised."""

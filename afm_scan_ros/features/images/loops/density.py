@@ -12,12 +12,11 @@ from typing import TypeAlias
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import nnls
 
 from afm_scan_ros.core.compiled import compiled
 from afm_scan_ros.core.effects.hysteresis.everett import EverettSurface, refuse_beyond
 from afm_scan_ros.core.effects.hysteresis.walk import INPUT, OUTPUT, remember
+from afm_scan_ros.core.fit.descent import bounded
 from afm_scan_ros.core.types import Array
 
 NOTHING: Array = np.empty(0)
@@ -31,11 +30,6 @@ class CellGrid:
     lower: float
     upper: float
     cells: int
-
-    @property
-    def count(self) -> int:
-        """Cells where alpha ≥ beta."""
-        return cell_count(self.cells)
 
     @property
     def width(self) -> float:
@@ -54,7 +48,7 @@ def side(count: int) -> int:
 
 
 def swept_areas(drive: Array, grid: CellGrid, before: Array = NOTHING, every: int = 1) -> Array:
-    """Share of each cell that is switched up, times two, shape (n // every, grid.count).
+    """Share of each cell that is switched up, times two, shape (n // every, cells).
 
     The drive (V), shape (n,), follows ``before``, shape (m,), which comes from the negative
     saturation, where all is down. Each row is the mean over ``every`` samples of the drive; those
@@ -66,9 +60,10 @@ def swept_areas(drive: Array, grid: CellGrid, before: Array = NOTHING, every: in
     refuse_beyond(drive, grid.lower, grid.upper)
     whole = np.concatenate([before, drive[: len(drive) // every * every]])
     levels = np.clip((whole - grid.lower) * (grid.cells / grid.width), 0.0, grid.cells)
-    rows = np.zeros((len(drive) // every, grid.count))
+    count = cell_count(grid.cells)
+    rows = np.zeros((len(drive) // every, count))
     stack = np.zeros((2, len(levels) + 1))
-    saved = np.zeros((_deepest(levels, stack) + 1, grid.count))
+    saved = np.zeros((_deepest(levels, stack) + 1, count))
     _sweep(levels, len(before), every, stack, saved, rows)
     return rows
 
@@ -179,10 +174,7 @@ def solve(equations: NormalEquations, smoothing: float) -> Array:
     least[diagonal(cells)] = REVERSIBLE * np.sqrt(equations.energy / equations.samples) / cells
     matrix = equations.gram / equations.samples + smoothing * roughness(cells)
     matrix += ROUNDING * np.trace(matrix) * np.eye(len(matrix))
-    root = cholesky(matrix, lower=True)
-    moment = equations.moment / equations.samples - matrix @ least
-    above = nnls(root.T, solve_triangular(root, moment, lower=True), maxiter=20 * len(root))[0]
-    return np.asarray(least + above)
+    return bounded(matrix, equations.moment / equations.samples, np.ones(len(least), bool), least)
 
 
 def roughness(cells: int) -> Array:

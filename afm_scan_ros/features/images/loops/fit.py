@@ -7,14 +7,19 @@ from collections.abc import Iterator, Sequence
 from functools import reduce
 from operator import add
 
-import numpy as np
 from attrs import frozen
 
 from afm_scan_ros.core.model import ParameterInterval
 from afm_scan_ros.core.types import Array, ProgressCallback
-from afm_scan_ros.features.images.loops import moving
-from afm_scan_ros.features.images.loops.density import CellGrid, NormalEquations, solve
-from afm_scan_ros.features.images.loops.moving import LinearDynamics, MovingRecord, Swept, swept
+from afm_scan_ros.features.images.loops.density import CellGrid, solve
+from afm_scan_ros.features.images.loops.moving import (
+    LinearDynamics,
+    LoopPart,
+    MovingRecord,
+    Swept,
+    loop_parts,
+    swept,
+)
 from afm_scan_ros.features.images.loops.search import (
     NO_CREEP,
     Densities,
@@ -77,8 +82,8 @@ def fit_jointly(
     smoothing = min(SMOOTHINGS, key=lambda choice: _crossed(folds, choice))
     progress("fitting the hysteresis")
     grid = grid_of(records, FINE)
-    rows = ((*one.weighted(found.dynamics), one.counted) for one in swept(records, grid))
-    weights = solve(reduce(add, (NormalEquations.of(*each) for each in rows)), smoothing)
+    wholes = (one.whole(found.dynamics).equations for one in swept(records, grid))
+    weights = solve(reduce(add, wholes), smoothing)
     rings = intervals.get(Lag) if ripple is None else ripple.intervals[0]
     return JointFit(weights, grid, found.dynamics, rings, intervals.get(OneCreep), smoothing)
 
@@ -107,52 +112,42 @@ def _sought(
     return _sought(grids, known, fewer)
 
 
-@frozen(eq=False)
-class _Fold:
-    """Pieces of one amplitude: their equations, means removed, and their drive's range (V)."""
-
-    equations: NormalEquations
-    lower: float
-    upper: float
-
-    def __add__(self, other: "_Fold") -> "_Fold":
-        ends = min(self.lower, other.lower), max(self.upper, other.upper)
-        return _Fold(self.equations + other.equations, *ends)
-
-    def within(self, others: Sequence["_Fold"]) -> bool:
-        """Whether the others' drives reach as far: no record predicts beyond its drive."""
-        near = ALIKE * (self.upper - self.lower)
-        lowest = min(fold.lower for fold in others) - near
-        return self.lower >= lowest and self.upper <= max(fold.upper for fold in others) + near
+def _within(part: LoopPart, others: Sequence[LoopPart]) -> bool:
+    """Whether the others' drives reach as far: no record predicts beyond its drive."""
+    near = ALIKE * (part.upper - part.lower)
+    lowest = min(other.lower for other in others) - near
+    return part.lower >= lowest and part.upper <= max(other.upper for other in others) + near
 
 
-def _crossed(folds: Sequence[_Fold], smoothing: float) -> float:
+def _crossed(folds: Sequence[LoopPart], smoothing: float) -> float:
     """Rms error, m, of the parts, each predicted from those of other amplitudes."""
-    squares, samples = 0.0, 0.0
-    covered = any(each.within(others) for each, others in _each_and_others(folds))
-    for left_out, others in _each_and_others(folds):
-        if left_out.within(others) or not covered:
-            weights = solve(reduce(add, (fold.equations for fold in others)), smoothing)
-            squares += left_out.equations.squares(weights)
-            samples += left_out.equations.samples
-    return float((max(squares, 0.0) / samples) ** 0.5)
+    pairs = list(_each_and_others(folds))
+    covered = [pair for pair in pairs if _within(*pair)]
+    return _left_out(covered or pairs, smoothing)
 
 
-def _each_and_others(folds: Sequence[_Fold]) -> Iterator[tuple[_Fold, Sequence[_Fold]]]:
+def _left_out(pairs: Sequence[tuple[LoopPart, Sequence[LoopPart]]], smoothing: float) -> float:
+    """Rms (m) by which each part is missed by a density fitted to the others."""
+    squares = 0.0
+    for part, others in pairs:
+        weights = solve(reduce(add, (other.equations for other in others)), smoothing)
+        squares += part.equations.squares(weights)
+    return float((max(squares, 0.0) / sum(part.samples for part, _ in pairs)) ** 0.5)
+
+
+def _each_and_others(
+    parts: Sequence[LoopPart],
+) -> Iterator[tuple[LoopPart, Sequence[LoopPart]]]:
     """Yield each part and all the others."""
-    for k, each in enumerate(folds):
-        yield each, [*folds[:k], *folds[k + 1 :]]
+    for k, each in enumerate(parts):
+        yield each, [*parts[:k], *parts[k + 1 :]]
 
 
-def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[_Fold]:
+def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[LoopPart]:
     """Pieces of like amplitude together; each alone where no amplitude lies within others."""
-    parts = (part for one in records for part in one.parts(dynamics))
-    pieces = [
-        _Fold(NormalEquations.of(each.areas, each.moved, each.samples), each.lower, each.upper)
-        for each in parts
-    ]
-    width = max(fold.upper for fold in pieces) - min(fold.lower for fold in pieces)
-    groups: list[list[_Fold]] = []
+    pieces = [part for one in records for part in one.parts(dynamics)]
+    width = max(piece.upper for piece in pieces) - min(piece.lower for piece in pieces)
+    groups: list[list[LoopPart]] = []
     for piece in pieces:
         for group in groups:
             apart = abs(group[0].lower - piece.lower) + abs(group[0].upper - piece.upper)
@@ -161,8 +156,8 @@ def _folds(records: Sequence[Swept], dynamics: LinearDynamics) -> list[_Fold]:
                 break
         else:
             groups.append([piece])
-    joined = [reduce(add, group) for group in groups]
-    covered = any(each.within(others) for each, others in _each_and_others(joined) if others)
+    joined = [LoopPart.together(group) for group in groups]
+    covered = any(_within(each, others) for each, others in _each_and_others(joined) if others)
     return joined if covered else pieces
 
 
@@ -170,12 +165,4 @@ def held_out_by_density(
     records: Sequence[Swept], dynamics: LinearDynamics, smoothing: float
 ) -> float:
     """Rms (m) by which each part is missed by a density of Preisach's fitted to the others."""
-    parts = [
-        NormalEquations.of(each.areas, each.moved, each.samples)
-        for each in moving.loop_parts(records, dynamics)
-    ]
-    squares = 0.0
-    for k, part in enumerate(parts):
-        others = reduce(add, [*parts[:k], *parts[k + 1 :]])
-        squares += max(part.squares(solve(others, smoothing)), 0.0)
-    return float(np.sqrt(squares / sum(part.samples for part in parts)))
+    return _left_out(list(_each_and_others(loop_parts(records, dynamics))), smoothing)

@@ -13,10 +13,9 @@ from scipy.signal import lfilter
 from afm_scan_ros.core.effects.creep import CreepModel
 from afm_scan_ros.core.effects.hysteresis.preisach import depolarising
 from afm_scan_ros.core.effects.vibration import VibrationModel, held
-from afm_scan_ros.core.errors import InputError
 from afm_scan_ros.core.identification.records.motion import turning_points
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.features.images.loops.density import CellGrid, swept_areas
+from afm_scan_ros.features.images.loops.density import CellGrid, NormalEquations, swept_areas
 
 ROWS = 4_000
 """Rows of all records together, to which they are averaged; it bounds time and memory of a fit."""
@@ -32,7 +31,6 @@ class MovingRecord:
 
     Where not ``measured`` (n,), the displacement counts nothing. What is measured follows a drive
     that has visited both of its ends, so that the memory is known, whatever it was at the start.
-    Raises InputError where the drive rests.
     """
 
     name: str
@@ -40,10 +38,6 @@ class MovingRecord:
     displacement: Array
     sample_period: float
     measured: NDArray[np.bool_]
-
-    def __attrs_post_init__(self) -> None:
-        if np.ptp(self.drive) == 0.0 or np.ptp(self.displacement) == 0.0:
-            raise InputError(f"{self.name}: drive or displacement rests; let the scanner move")
 
     def cut(self, samples: int) -> "MovingRecord":
         """Return the record's first samples."""
@@ -67,10 +61,11 @@ class LinearDynamics:
 
 @frozen(eq=False)
 class LoopPart:
-    """Areas (n, p) and displacement (n,), m, of one stretch of a loop in all records that have it.
+    """Areas (n, p) and displacement (n,), m, of a stretch of a record, or of one of several.
 
-    Each record's are without their means, times the root of the samples of a row; they count
-    ``samples``. The drive is from ``lower`` to ``upper`` (V).
+    Each record's are without their means, as the sensor's zero is arbitrary, times the root of the
+    samples of a row, so that squares count samples; they count ``samples``. The drive is from
+    ``lower`` to ``upper`` (V).
     """
 
     areas: Array
@@ -78,6 +73,26 @@ class LoopPart:
     samples: float
     lower: float
     upper: float
+
+    @classmethod
+    def of(cls, areas: Array, moved: Array, samples: Array, drive: Array) -> "LoopPart":
+        """Take rows that count for ``samples``, and their drive (rows, every)."""
+        total, root = float(samples.sum()), np.sqrt(samples)
+        areas, moved = (each - samples @ each / total for each in (areas, moved))
+        ends = float(drive.min()), float(drive.max())
+        return cls(root[:, np.newaxis] * areas, root * moved, total, *ends)
+
+    @classmethod
+    def together(cls, parts: Sequence["LoopPart"]) -> "LoopPart":
+        """Return several as one."""
+        areas, moved = (np.concatenate([getattr(p, n) for p in parts]) for n in ("areas", "moved"))
+        ends = min(part.lower for part in parts), max(part.upper for part in parts)
+        return cls(areas, moved, sum(part.samples for part in parts), *ends)
+
+    @property
+    def equations(self) -> NormalEquations:
+        """Equations of the weights of the areas."""
+        return NormalEquations.of(self.areas, self.moved, self.samples)
 
 
 @define(frozen=True, eq=False, slots=False)
@@ -100,34 +115,17 @@ class Swept:
         """Seconds between rows."""
         return self.every * self.record.sample_period
 
-    def regression(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
-        """Areas behind the dynamics, and the displacement, in the rows that were measured.
-
-        Both are without their means, as the sensor's zero is arbitrary.
-        """
+    def parts(self, dynamics: LinearDynamics, count: int = PIECES) -> list[LoopPart]:
+        """Return so many equal parts of the rows that were measured, behind the dynamics."""
         areas = _creeping(self._vibrating(dynamics.vibration), dynamics.creep, self.row_period)
-        areas, moved = areas[self.measured], self.moved[self.measured]
-        return areas - areas.mean(axis=0), moved - moved.mean()
-
-    def weighted(self, dynamics: LinearDynamics) -> tuple[Array, Array]:
-        """The same with each row times the root of its samples, so that squares count samples."""
-        return centred(*self.regression(dynamics), self.samples[self.measured])
-
-    def parts(self, dynamics: LinearDynamics) -> Iterator[LoopPart]:
-        """Yield equal parts of the record."""
-        areas, moved = self.regression(dynamics)
-        samples = self.samples[self.measured]
         drive = self.record.drive[: len(self.moved) * self.every].reshape(len(self.moved), -1)
-        drive = drive[self.measured]
-        for part in parts_of([len(moved)]):
-            rows = centred(areas[part], moved[part], samples[part])
-            ends = float(drive[part].min()), float(drive[part].max())
-            yield LoopPart(*rows, float(samples[part].sum()), *ends)
+        rows = [each[self.measured] for each in (areas, self.moved, self.samples, drive)]
+        parts = parts_of([len(rows[0])], count)
+        return [LoopPart.of(*(each[part] for each in rows)) for part in parts]
 
-    @property
-    def counted(self) -> float:
-        """Samples of all rows that were measured."""
-        return float(self.samples[self.measured].sum())
+    def whole(self, dynamics: LinearDynamics) -> LoopPart:
+        """Return all of these rows."""
+        return self.parts(dynamics, 1)[0]
 
     def shared_until(self, last: int) -> "Swept":
         """The same, where other rows show the samples before ``last`` too: each counts half."""
@@ -154,13 +152,6 @@ class Swept:
         back = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, length - rows))
         padded[:, rows:] = np.outer(self.areas[-1], back)
         return length, np.asarray(scipy.fft.rfft(padded))
-
-
-def centred(areas: Array, moved: Array, samples: Array) -> tuple[Array, Array]:
-    """Take rows without their means, times the root of the samples that each counts for."""
-    share, root = samples / samples.sum(), np.sqrt(samples)
-    areas, moved = areas - share @ areas, moved - share @ moved
-    return root[:, np.newaxis] * areas, root * moved
 
 
 def _creeping(areas: Array, creep: CreepModel, period: float) -> Array:
@@ -204,11 +195,11 @@ def _swept(record: MovingRecord, grid: CellGrid, every: int) -> Swept:
     return Swept(record, every, moved, areas - rest, measured, samples)
 
 
-def parts_of(lengths: Sequence[int]) -> list[slice]:
-    """Equal parts of each of several runs of rows that follow each other."""
+def parts_of(lengths: Sequence[int], count: int = PIECES) -> list[slice]:
+    """Equal parts, ``count`` many, of each of several runs of rows that follow each other."""
     found, first = [], 0
     for length in lengths:
-        edges = first + np.linspace(0, length, PIECES + 1).astype(int)
+        edges = first + np.linspace(0, length, count + 1).astype(int)
         found += [slice(a, b) for a, b in pairwise(edges) if a < b]
         first += length
     return found
@@ -220,10 +211,4 @@ def loop_parts(records: Sequence[Swept], dynamics: LinearDynamics) -> list[LoopP
     for one in records:
         for number, part in enumerate(one.parts(dynamics)):
             groups.setdefault((float(np.ptp(one.record.drive)), number), []).append(part)
-    return [_together(group) for group in groups.values()]
-
-
-def _together(group: Sequence[LoopPart]) -> LoopPart:
-    areas, moved = (np.concatenate([getattr(p, n) for p in group]) for n in ("areas", "moved"))
-    ends = min(part.lower for part in group), max(part.upper for part in group)
-    return LoopPart(areas, moved, sum(part.samples for part in group), *ends)
+    return [LoopPart.together(group) for group in groups.values()]

@@ -7,8 +7,6 @@ moves: no free decay is asked for, as images show no turns.
 """
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add
 from typing import TypeAlias
 
 import numpy as np
@@ -23,9 +21,10 @@ from afm_scan_ros.core.fit.likeness import jackknife
 from afm_scan_ros.core.fit.noise import correlation_length
 from afm_scan_ros.core.model import ParameterInterval, closed
 from afm_scan_ros.core.types import Array
-from afm_scan_ros.features.images.loops.density import NormalEquations, solve
+from afm_scan_ros.features.images.loops.density import solve
 from afm_scan_ros.features.images.loops.moving import (
     LinearDynamics,
+    LoopPart,
     MovingRecord,
     Swept,
     parts_of,
@@ -156,11 +155,9 @@ class Densities:
 
     def residual(self, dynamics: LinearDynamics) -> Array:
         """Residual of the best density, each row times the root of its samples."""
-        regressions = [(*one.weighted(dynamics), one.counted) for one in self.records]
-        whole = reduce(add, (NormalEquations.of(*each) for each in regressions))
-        weights = solve(whole, self.smoothing)
-        misses = np.concatenate([moved - areas @ weights for areas, moved, _ in regressions])
-        return np.asarray(misses / np.sqrt(whole.energy))
+        whole = LoopPart.together([one.whole(dynamics) for one in self.records])
+        missed = whole.moved - whole.areas @ solve(whole.equations, self.smoothing)
+        return np.asarray(missed / np.linalg.norm(whole.moved))
 
     def pieces(self) -> Sequence[slice]:
         """Parts of each record, counted through all."""
