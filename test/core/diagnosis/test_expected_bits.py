@@ -178,20 +178,27 @@ def _late(delay: float) -> InProcessSession:
     return InProcessSession(evolve(default_plant(), mechanisms=late))
 
 
-@pytest.mark.evidence
-@pytest.mark.parametrize(
-    ("session", "name"), [(_gained(1.03), "parameter_shift"), (_late(5e-5), "delay")]
-)
-def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded(
-    session: InProcessSession, name: str
-) -> None:
-    """A gain is like a stiffness with hysteresis, and a delay is like a lag."""
+def _scanned(session: InProcessSession) -> Record:
     scan = session.scan("scan", ScanSpec(lines=6), default_model())
-    first = Record.of_traces("scan", scan.drive, scan.measured, scan.spec)
+    return Record.of_traces("scan", scan.drive, scan.measured, scan.spec)
+
+
+@pytest.mark.evidence
+def test_a_gain_is_no_stiffness_whose_hysteresis_has_no_width() -> None:
+    found = diagnose(default_model(), [_scanned(_gained(1.03))])
+    assert found.verdict == FOUND
+    assert [effect.name for effect in found.effects] == ["parameter_shift"]
+
+
+@pytest.mark.evidence
+def test_an_ambiguous_effect_is_named_once_the_proposed_experiment_is_recorded() -> None:
+    """A delay is like a lag."""
+    session = _late(5e-5)
+    first = _scanned(session)
     doubt = diagnose(default_model(), [first])
     assert doubt.verdict == AMBIGUOUS
     assert doubt.proposal is not None
     further = session.experiment(doubt.proposal.experiment.plan_for(default_model()))
     found = diagnose(default_model(), [first, further])
     assert found.verdict == FOUND
-    assert [effect.name for effect in found.effects] == [name]
+    assert [effect.name for effect in found.effects] == ["delay"]
