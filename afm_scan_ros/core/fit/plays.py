@@ -9,8 +9,8 @@ correction that lets the density vary along the other axis of the Preisach plane
 
 with the widths Δ_r of the grid of thresholds over the half range, the density d_r, and quadratic
 B-splines b_j of the play's position, whose coefficients c_j(r) are linear between a few thresholds.
-T_r is zero in the middle of the range, or where a play stays that the range cannot push both ways,
-and the middle is added to T_0, so that P(u) lies about u in any range.
+T_r is zero in the middle of a range that is not about 0 V, or where a play stays that the range
+cannot push both ways, and the middle is added to T_0, so that P(u) lies about u in any range.
 Source: M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, 2.3 and 2.4.
 """
 
@@ -96,9 +96,13 @@ class Plays:
 
     @cached_property
     def origins(self) -> Array:
-        """Positions of plays (V) at which T_r is zero, shape (plays,)."""
-        middle = 0.5 * (self.lower + self.upper)
-        return np.where(self.thresholds > self.half, self.settled, middle)
+        """Positions of plays (V) at which T_r is zero, shape (plays,).
+
+        In a range about 0 V, where no play moves once, that is rest.
+        """
+        once = self.thresholds > self.half
+        middle = 0.5 * (self.lower + self.upper) if once.any() else 0.0
+        return np.where(once, self.settled, middle)
 
     @cached_property
     def risen(self) -> Array:
