@@ -106,11 +106,12 @@ class Plays:
 
     @cached_property
     def risen(self) -> Array:
-        """Rises of the B-splines at the origins, V, (plays, splines)."""
+        """Rises of the B-splines at the origins, V, (plays, splines); none in the middle."""
         places = (self.origins - self.lower) / (self.positions[1] - self.positions[0])
         cells = np.clip(places.astype(int), 0, len(self.positions) - 2)
         before, after = self.rises[:, cells], self.rises[:, cells + 1]
-        return np.asarray((before + (places - cells) * (after - before)).T)
+        values = before + (places - cells) * (after - before)
+        return np.where(self.thresholds > self.half, values, 0.0).T
 
     @cached_property
     def rises(self) -> Array:
