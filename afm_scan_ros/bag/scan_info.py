@@ -105,18 +105,21 @@ def decode_info(cdr: bytes) -> ScanInfo:
 
     Raises InputError where it is not one.
     """
-    centred = cdr + bytes(-(len(cdr) - typestore.ENCODING_SIZE) % 8 + 2 * 8)
     try:
-        message = _decoded(cdr) or typestore.decode(TYPE, centred)
+        message = _message(cdr)
     except ValueError as error:
         raise InputError(f"scan_info: {error}") from error
     return info_from_message(message)
 
 
-def _decoded(cdr: bytes) -> typestore.Message | None:
+def _message(cdr: bytes) -> typestore.Message:
+    """Decode a message; the centre is two numbers at its end, each at a multiple of their size."""
     with suppress(ValueError):
         return typestore.decode(TYPE, cdr)
-    return None
+    size = np.dtype(np.float64).itemsize
+    return typestore.decode(
+        TYPE, cdr + bytes(-(len(cdr) - typestore.ENCODING_SIZE) % size + 2 * size)
+    )
 
 
 DISPLACEMENT = f"{typestore.PACKAGE}/DisplacementBlock"

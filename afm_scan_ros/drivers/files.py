@@ -10,6 +10,7 @@ from attrs import field, frozen
 from attrs.validators import gt
 
 from afm_scan_ros.core.errors import InputError, ScanError
+from afm_scan_ros.core.limits import ramp_to_rest
 from afm_scan_ros.core.types import AXES, Array, Trace
 from afm_scan_ros.drivers import DriverChoice
 from afm_scan_ros.drivers.guarded import SensorWatch, held_after
@@ -47,23 +48,35 @@ class FileExchange:
     def displacement(self, name: str, drive: Trace, report: Callable[[str], None]) -> Trace:
         """Let the other program output a whole drive (V); return the displacement (m).
 
-        ``report`` gets what is waited for. Raises InputError for a record that does not fit the
-        drive, ScanError for a drive beyond a limit, a lost sensor, or no record in time.
+        What it outputs ends at 0 V, by the amplifier's ramp. ``report`` gets what is waited for.
+        Raises InputError for a record that does not fit the drive, ScanError for a drive beyond a
+        limit, a lost sensor, or no record in time.
         """
         self.settings.amplifier.limits.refuse_beyond(drive, dict.fromkeys(AXES, 0.0))
         late = self.settings.latency_samples
-        held = held_after(drive, late)
+        whole = self._ended(held_after(drive, late))
         target = self._folder / f"{name}.csv"
         record = target.with_name(f"{name}.measured.csv")
-        self._write(target, record, held)
+        self._write(target, record, whole)
         try:
             self._wait(record, report)
         except BaseException:
             target.unlink(missing_ok=True)  # nobody is to output it unattended
             raise
-        read = _readings(record, held)
-        SensorWatch(self.settings, held.sample_period, late).check(held, read)
-        x, y = self.settings.x.metres(read.x[late:]), self.settings.y.metres(read.y[late:])
+        read = _readings(record, whole)
+        SensorWatch(self.settings, whole.sample_period, late).check(whole, read)
+        known = slice(late, late + drive.x.size)
+        x, y = self.settings.x.metres(read.x[known]), self.settings.y.metres(read.y[known])
+        return Trace(drive.first_sample, drive.sample_period, x, y)
+
+    def _ended(self, drive: Trace) -> Trace:
+        """Return a drive (V) with the ramp from its end to rest, where it does not end there."""
+        last = {axis: float(drive.axis(axis)[-1]) for axis in AXES}
+        if not any(last.values()):
+            return drive
+        slew = self.settings.amplifier.ramp_down_slew
+        ramp = ramp_to_rest(drive.first_sample + drive.x.size, drive.sample_period, last, slew)
+        x, y = (np.concatenate([drive.axis(axis), ramp.axis(axis)]) for axis in AXES)
         return Trace(drive.first_sample, drive.sample_period, x, y)
 
     def _write(self, target: Path, record: Path, drive: Trace) -> None:

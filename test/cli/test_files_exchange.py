@@ -128,11 +128,11 @@ def test_the_limits_of_a_scanner_by_files_are_those_of_its_settings() -> None:
         driver_and_file("files:stage.yaml")
 
 
-def exchanged(record: str, *, latency: int = 0, timeout: float = 60.0) -> Trace:
-    """Exchange a drive of a second, up to 2 V, for a record that is there as soon as it is."""
+def exchanged(record: str, *, latency: int = 0, timeout: float = 60.0, end: float = 0.0) -> Trace:
+    """Exchange a drive of a second, from 2 V to an end, for a record that is there as it is."""
     settings = SETTINGS.replace("latency_samples: 0", f"latency_samples: {latency}")
     Path("stage.yaml").write_text(settings.replace("120.0", f"{timeout}"), "utf-8")
-    drive = Trace(0, PERIOD, np.linspace(0.0, 2.0, 1000), np.zeros(1000))
+    drive = Trace(0, PERIOD, np.linspace(2.0, end, 1000), np.zeros(1000))
     exchange = FileExchange(load_settings("files", Path("stage.yaml")))
 
     def answer(_: str) -> None:
@@ -152,6 +152,18 @@ def test_late_readings_have_the_sample_of_their_displacement() -> None:
     expected = METRES_PER_VOLT * np.linspace(0.0, 1.0, 1007)[7:]
     np.testing.assert_allclose(moved.x, expected, rtol=1e-8)
     assert len(np.loadtxt("exchange/rest.csv", delimiter=",", skiprows=1)) == 1007
+
+
+def test_what_is_put_out_ends_at_rest_and_the_ramp_is_no_part_of_the_record() -> None:
+    """Half a cosine from 1 V at 40 V/s takes 40 samples, after two in which readings come late."""
+    moved = exchanged(rows(1042), latency=2, end=1.0)
+    expected = METRES_PER_VOLT * np.linspace(0.0, 1.0, 1042)[2:1002]
+    np.testing.assert_allclose(moved.x, expected, rtol=1e-8)
+    output = np.loadtxt("exchange/rest.csv", delimiter=",", skiprows=1)[:, 1]
+    assert output[999:1002].tolist() == [1.0] * 3
+    assert output[-1] == pytest.approx(0.0, abs=1e-15)
+    assert np.all(np.diff(output[1001:]) < 0.0)
+    assert np.abs(np.diff(output[1001:])).max() <= 40.0 * PERIOD
 
 
 @pytest.mark.parametrize(
