@@ -51,13 +51,13 @@ class Posterior:
     ) -> "Posterior":
         """Posterior over the model ``without`` an effect and the sets of some trials.
 
-        What a simpler set says as well at an end of a range is no hypothesis beside it.
-        ``outside`` is the log evidence of what no effect describes; a scanner has it as often as
-        one of the catalogue. It has a shape of its own, which the likeliest trial tells, of the
-        ``counts`` (cells,) of coefficients.
+        A trial that is a simpler one of another set is no further hypothesis. ``outside`` is the
+        log evidence of what no effect describes; a scanner has it as often as one of the catalogue.
+        It has a shape of its own, which the likeliest trial tells, of the ``counts`` (cells,) of
+        coefficients.
         """
         by_set: dict[Names, list[FittedCandidates]] = {}
-        trials = [trial for trial in trials if not _nested(trial, (without, *trials))]
+        trials = [trial for trial in trials if not any(_is(trial, other) for other in trials)]
         for trial in trials:
             by_set.setdefault(tuple(sorted(set(trial.names))), []).append(trial)
         distinct = {names: _distinct(found) for names, found in by_set.items()}
@@ -116,19 +116,17 @@ class Posterior:
         return tuple(self.logs)[: 1 + int(np.searchsorted(reached, share))]
 
 
-def _nested(trial: FittedCandidates, others: Iterable[FittedCandidates]) -> bool:
-    """Whether a trial is another set of fewer numbers, at an end of a range that it may be at.
+def _is(trial: FittedCandidates, other: FittedCandidates) -> bool:
+    """Whether a trial is, at an end of a range, another set of fewer numbers: it fits as well.
 
-    Plays of no width are a spring, and an effect of no amount is none. Further numbers then gain
-    half a chi-squared of as many in likelihood (Wilks, Ann. Math. Stat. 9, 1938, 60).
+    Plays of no width are a spring, and of two effects that of no amount is none. The further
+    numbers gain half a chi-squared of as many in likelihood (Wilks, Ann. Math. Stat. 9, 1938, 60).
     """
-    for other in others:
-        more = trial.fit.rows.shape[1] - other.fit.rows.shape[1]
-        if more > 0 and set(other.names) != set(trial.names):
-            gained = trial.cells.log_likelihood - other.cells.log_likelihood
-            if gained <= 0.5 * chi2.ppf(SEARCH.certain, more):
-                return trial.may_be_at_end
-    return False
+    more = trial.fit.rows.shape[1] - other.fit.rows.shape[1]
+    if more <= 0 or set(other.names) == set(trial.names) or not trial.may_be_at_end:
+        return False
+    gained = trial.cells.log_likelihood - other.cells.log_likelihood
+    return bool(abs(gained) <= 0.5 * chi2.ppf(SEARCH.certain, more))
 
 
 def _simplest(trials: tuple[FittedCandidates, ...]) -> FittedCandidates:
