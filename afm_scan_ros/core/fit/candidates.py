@@ -238,10 +238,9 @@ def with_one_state(fit: AxisFit) -> AxisFit:
     begun = np.array([output[0] - drive[0] for drive, output in paths])
     memory = begun[[not one.rested for one in records]]
     tail = np.concatenate([linear, np.zeros(operator.rests), memory])
-    starts = [np.concatenate([one, tail]) for one in operator.started(paths)]
+    theta = np.concatenate([operator.started(paths), tail])
     laid = evolve(layout, operator=operator, unknown_starts=len(memory))
-    other = AxisFit(laid, records, fit.gain, starts[0], fit.discrepancy)
-    other.theta = min(starts, key=other.objective)
+    other = AxisFit(laid, records, fit.gain, theta, fit.discrepancy)
     other.lay_out(evolve(other.layout, modes=0))
     other.weigh()
     while (other.layout.modes == 0 and add_first_mode(other)) or add_mode(other):

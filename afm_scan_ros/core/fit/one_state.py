@@ -14,6 +14,7 @@ from attrs import evolve, frozen
 from scipy.interpolate import BSpline
 
 from afm_scan_ros.core.effects.hysteresis.branches import (
+    STOPS,
     by_input,
     mean_sensitivities,
     sensitivities,
@@ -139,43 +140,58 @@ class OneState:
             part = edges[first : first + at_once + 1]
             yield mean_sensitivities(tables, self.cells, now, grown, drive, part)
 
-    def started(self, paths: Sequence[tuple[Array, Array]]) -> list[Array]:
-        """Slopes that lead from each sample of drive and A (V) to the next, ever smoother ones.
+    def started(self, paths: Sequence[tuple[Array, Array]]) -> Array:
+        """Slopes that follow paths of drive and A (V) best, from an ever weaker prior on.
 
-        Paths that no such operator makes give slopes that lead astray unless they are smooth. So
-        the last have no hysteresis, and none exceeds what is expected of a slope.
+        The first lead from each sample to the next, which is nearly linear in them, the others
+        along the whole paths. Where none follows, there is no hysteresis. The operator knows no
+        time, so that between the turns of a drive few samples do.
         """
+        thin = [self._thinned(*path) for path in paths]
         prior = self.precision("slopes", {"slopes": 0.1 * self.settings.slopes})
-        first = self._stepped(paths, self.unbent())
-        prior *= np.trace(first[0]) / np.trace(prior)
-        found = []
-        for strength in np.logspace(-12.0, 0.0, 9):
-            theta, (matrix, right) = self.unbent(), first
-            for done in range(self.settings.start_rounds):
-                if done:
-                    matrix, right = self._stepped(paths, theta)
-                # Paths without a loop leave slopes free, and hardly a prior to scale.
-                theta = np.linalg.lstsq(matrix + strength * prior, right, rcond=None)[0]
+        theta, normal = self.unbent(), self._stepped(thin, self.unbent(), whole=False)
+        best, least = theta, self._stepped(thin, theta)[2]
+        for strength in np.logspace(0.0, -3.0, self.settings.start_strengths):
+            for _ in range(self.settings.start_rounds):
+                matrix, right, _ = normal
+                weight = strength * max(np.trace(matrix), np.finfo(float).tiny) / np.trace(prior)
+                theta = np.linalg.lstsq(matrix + weight * prior, right, rcond=None)[0]
                 theta = np.clip(theta, self.lowest, self.settings.slopes)
-            found.append(theta)
-        return [*found, self.unbent()]
+                normal = self._stepped(thin, theta)
+                if normal[2] < least:
+                    best, least = theta, normal[2]
+        return best
 
-    def _stepped(self, paths: Sequence[tuple[Array, Array]], theta: Array) -> tuple[Array, Array]:
-        """Normal equations for the slopes that lead from sample to sample, linearised at some."""
-        matrix, right = np.zeros((self.parts["slopes"],) * 2), self.unbent()
+    def _thinned(self, drive: Array, output: Array) -> tuple[Array, Array]:
+        """Leave of a path its turns, its ends, and the first samples behind stops of branches."""
+        ways, stops = np.sign(np.diff(drive)), np.floor(STOPS * drive / self.cells[1])
+        kept = np.ones(len(drive), bool)
+        kept[1:-1] = (ways[1:] != ways[:-1]) | (stops[1:-1] != stops[:-2])
+        return drive[kept], output[kept]
+
+    def _stepped(
+        self, paths: Sequence[tuple[Array, Array]], theta: Array, *, whole: bool = True
+    ) -> tuple[Array, Array, float]:
+        """Normal equations for slopes that follow whole paths, linearised at some; their misfit.
+
+        Or else those that lead from each sample of the paths to the next.
+        """
+        matrix, right, misfit = np.zeros((self.parts["slopes"],) * 2), self.unbent(), 0.0
         at_once = self.settings.rows_at_once
         for drive, output in paths:
             w = output - drive
-            for first in range(0, len(drive) - 1, at_once):
-                part = slice(first + 1, first + at_once + 1)
-                now, grown = np.array([drive[first], w[first]]), self.unbent()
+            known = np.full(len(w), np.nan) if whole else w
+            now, grown = np.array([drive[0], w[0]]), self.unbent()
+            for first in range(1, len(drive), at_once):
+                part = slice(first, first + at_once)
                 given = theta.reshape(self.shape), self.cells, now, grown
-                reached, jacobian = sensitivities(*given, drive[part], w[part])
+                reached, jacobian = sensitivities(*given, drive[part], known[part])
                 live = np.flatnonzero(jacobian.any(axis=0))
-                columns = jacobian[:, live]
+                columns, left = jacobian[:, live], w[part] - reached
                 matrix[np.ix_(live, live)] += columns.T @ columns
-                right[live] += columns.T @ (w[part] - reached + columns @ theta[live])
-        return matrix, right
+                right[live] += columns.T @ (left + columns @ theta[live])
+                misfit += float(left @ left)
+        return matrix, right, misfit
 
     def covering(self, theta: Array, states: Array) -> tuple["OneState", Array]:
         """Return the same slopes on cells that reach just beyond all states w (V).

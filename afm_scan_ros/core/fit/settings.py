@@ -81,11 +81,17 @@ class FitSettings:
         "how far the slopes reach beyond the states of the start",
         "the start errs by a few per cent",
     )
-    start_rounds: int = setting(
-        3,
+    start_strengths: int = setting(
+        7,
         "1",
-        "linearisations of the slopes that an operator of one state starts from",
-        "the first errs by the change of the state over a sample",
+        "priors, the last a thousandth of the first, of the slopes that one state starts from",
+        "each is half a decade: slopes of one lie near those of the next",
+    )
+    start_rounds: int = setting(
+        2,
+        "1",
+        "linearisations of these slopes under each prior",
+        "by two the misfit of a path hardly falls under the same prior",
     )
     least_slope: float = setting(
         0.02, "1", "least slope dA/du of a model", "only an output that grows has an inverse"
