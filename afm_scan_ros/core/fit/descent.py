@@ -203,12 +203,14 @@ def _descend(fit: AxisFit, equations: _Equations) -> float:
 
     Where none does, the damping stays what it was, for those of the next step are other equations.
     While the objective is as quadratic as steps take it to be, the first is tried without a bend.
+    It is the only one where a fit that has converged would gain no more.
     """
     settings, start = fit.layout.settings, fit.theta
     lowest, before = fit.layout.lowest() - start, fit.objective(start)
     fit.remaining = equations.foreseen(equations.move(0.0, equations.right, lowest))
-    straight, fit.quadratic, worse, kept = fit.quadratic, False, 2.0, fit.damping
-    for _ in range(settings.most_trials):
+    straight, near = fit.quadratic or fit.converged, fit.converged
+    fit.quadratic, worse, kept = False, 2.0, fit.damping
+    for _ in range(1 if near else settings.most_trials):
         move = equations.move(fit.damping, equations.right, lowest)
         theta = start + (move if straight else _bent(fit, equations, move, lowest))
         fell = before - fit.objective(theta)

@@ -65,6 +65,21 @@ def test_a_step_to_a_mode_that_does_not_oscillate_is_none_downhill() -> None:
         fit.simulated(theta)
 
 
+def test_a_fit_that_has_converged_tries_no_more_than_one_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drive = levels(4, 6, 300)
+    noise = 1e-9 * np.random.default_rng(1).standard_normal(len(drive))
+    fit = AxisFit(*of_plays_alone(drive, GAIN * of_plays(drive) + noise))
+    settle(fit, SETTINGS.most_steps)
+    while step(fit) > 0.0:
+        assert fit.converged
+    tried, objective = [], AxisFit.objective
+    monkeypatch.setattr(AxisFit, "objective", lambda *of: tried.append(of) or objective(*of))
+    step(fit)
+    assert len(tried) == 2  # where it is, and where the step leads
+
+
 def test_steps_follow_the_curve_of_a_valley() -> None:
     """The map behind plays makes one; of straight steps the third still brings 20 nat."""
     layout = layout_of(PlayBank(-LIMIT, LIMIT), 1.0, PERIOD, SETTINGS, 2.0 * np.pi * FREQUENCY)
