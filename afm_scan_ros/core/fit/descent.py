@@ -115,7 +115,7 @@ def step(fit: AxisFit, groups: Sequence[str] = (), *, searching: bool = False) -
     equations = _Equations(whole, right, free, held, metric)
     fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
     mapped = fit.layout.parts["map"]
-    if fell == 0.0 and free[mapped].any():
+    if fell == 0.0 and free[mapped].any() and not fit.converged:
         free[mapped] = False
         fell = _descend(fit, _growing(fit, equations) if fit.grows else equations)
     return fell + recall(fit) if alone else fell

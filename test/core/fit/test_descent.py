@@ -73,7 +73,7 @@ def test_a_fit_that_has_converged_tries_no_more_than_one_step(
     fit = AxisFit(*of_plays_alone(drive, GAIN * of_plays(drive) + noise))
     settle(fit, SETTINGS.most_steps)
     while step(fit) > 0.0:
-        assert fit.converged
+        fit.weigh()
     tried, objective = [], AxisFit.objective
     monkeypatch.setattr(AxisFit, "objective", lambda *of: tried.append(of) or objective(*of))
     step(fit)
