@@ -60,16 +60,27 @@ def first_mode(fit: AxisFit) -> FoundMode | None:
     """Return the mode that explains most of what a straight line leaves, None where it is little.
 
     Where it explains a good part of what is left of a record, that is about a resonance rather than
-    of the loops of the hysteresis. The static gain is free beside it, for a straight line through
-    such a motion has another.
+    of the loops of the hysteresis, if it does so too where these are fitted beside it. The static
+    gain is free beside it, for a straight line through such a motion has another.
     """
     free = np.zeros(fit.layout.size, bool)
     for name in ("lags", "creep"):
         free[fit.layout.parts[name]] = True
     lefts = zip(fit.records, fit.residuals(), strict=True)
     most = max(0.5 * float(left @ left) / fit.variance(record) for record, left in lefts)
-    every = _summits(fit, free, fit.layout.settings.dominant_share * most, 1, broad=True)
-    return next((one for one in every if _excited(one, fit)), None)
+    settings = fit.layout.settings
+    enough = settings.dominant_share * most
+    every = _summits(fit, free, enough, settings.tried_modes, broad=True)
+    some = (one for one in every if _excited(one, fit))
+    return next((one for one in some if _beside_loops(one, fit, free) > enough), None)
+
+
+def _beside_loops(found: FoundMode, fit: AxisFit, free: NDArray[np.bool_]) -> float:
+    """What a mode explains (nat) where the operator is free too: slow loops look like a mode."""
+    wider = free.copy()
+    for name in fit.layout.operator.parts:
+        wider[fit.layout.parts[name]] = True
+    return max((one.chance for one in ScoreTest(fit, wider).of([found.mode[:2]])), default=0.0)
 
 
 def further_modes(fit: AxisFit, most: int = 1) -> list[FoundMode]:

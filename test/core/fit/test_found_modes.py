@@ -6,6 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+import afm_scan_ros as afm
+from afm_scan_ros.core.fit.axis import started
 from afm_scan_ros.core.fit.descent import settle
 from afm_scan_ros.core.fit.estimator import AxisFit
 from afm_scan_ros.core.fit.modes import add_first_mode, first_mode, further_modes
@@ -17,6 +19,7 @@ from helpers.fit_cases import (
     FREQUENCY,
     GAIN,
     PERIOD,
+    SETTINGS,
     displaced,
     levels,
     of_plays,
@@ -184,3 +187,27 @@ def test_a_mode_within_another_s_bandwidth_is_no_error_of_its_peak(peak: float, 
     add_first_mode(fit)
     settle(fit, 20, ("lags", "modes", "creep"))
     assert len(further_modes(fit)) == seen
+
+
+def test_loops_of_slow_triangles_are_no_mode() -> None:
+    """Beside a straight line a mode as slow as they are explains a good part of them."""
+    seconds = 2e-3 * np.arange(6000)
+    triangles = signal.sawtooth(2.0 * np.pi * seconds + 0.5 * np.pi, 0.5)
+    fading = 3.5 * (1.0 - seconds / seconds[-1]) * triangles
+    given = [
+        afm.Record(drive, 1e-6 * wide(drive), period)
+        for drive, period in ((levels(1, 60, 400), 5e-4), (fading, 2e-3))
+    ]
+    fit = started(given, "x", SETTINGS)
+    fit.weigh()
+    assert first_mode(fit) is None
+
+
+def wide(drive: Array) -> Array:
+    """Output of forty plays, whose loops open by a quarter of the range."""
+    thresholds, play = np.linspace(0.05, 3.4, 40), np.zeros(40)
+    output = np.empty_like(drive)
+    for k, u in enumerate(drive):
+        play = np.clip(play, u - thresholds, u + thresholds)
+        output[k] = u + 0.06 * play.sum()
+    return output
