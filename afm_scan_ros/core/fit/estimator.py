@@ -54,6 +54,7 @@ class AxisFit:
     _columns: dict[int, tuple[Array, list[Columns]]] = field(factory=dict)
     _regressors: dict[int, tuple[object, dict[bool, tuple[Array, Array]]]] = field(factory=dict)
     _last: tuple[Layout, Array, list[Simulation]] | None = None
+    _normal: tuple[list[object], tuple[Array, Array]] | None = None
 
     @scales.default
     def _first(self) -> dict[str, float]:
@@ -177,8 +178,15 @@ class AxisFit:
     def normal(self, *, with_operator: bool) -> tuple[Array, Array]:
         """H and g of the normal equations H δ = g at θ, shapes (size, size) and (size,).
 
-        Raises ScanError where they overflow.
+        Those of the last call are kept. Raises ScanError where they overflow.
         """
+        at = [self.layout, self.theta, *self.records, (self.gain, self.discrepancy, with_operator)]
+        if self._normal is None or not _same(self._normal[0], at):
+            self._normal = at, self._normal_at(with_operator=with_operator)
+        matrix, right = self._normal[1]
+        return matrix.copy(), right.copy()
+
+    def _normal_at(self, *, with_operator: bool) -> tuple[Array, Array]:
         matrix, right = np.zeros((self.layout.size,) * 2), np.zeros(self.layout.size)
         with np.errstate(over="ignore", invalid="ignore"):
             for k, left in enumerate(self.gathered()):
@@ -294,6 +302,12 @@ class AxisFit:
             return made
         self._columns[k] = start, list(made)
         return self._columns[k][1]
+
+
+def _same(before: list[object], now: list[object]) -> bool:
+    """Whether all are the same objects, and the last equal numbers."""
+    pairs = zip(before[:-1], now[:-1], strict=True)
+    return len(before) == len(now) and all(a is b for a, b in pairs) and before[-1] == now[-1]
 
 
 def _finite(values: Array) -> Array:
